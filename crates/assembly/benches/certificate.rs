@@ -1,4 +1,4 @@
-//! Proofs of locks on round shells made by code: 13 and 40 pieces with 20 000 contacts.
+//! Benchmark of proofs of locks on round shells made by code: 13 and 40 pieces with 20 000 contacts.
 
 use divan::Bencher;
 use rand::RngExt;
@@ -28,8 +28,9 @@ struct Shell {
 }
 
 impl Shell {
-    /// Seams are where two of evenly spread centers are equally near. Across a seam the later piece may leave
-    /// along its direction `s` only: contacts are square to `s`, all around, or face against it.
+    /// Builds the shell. Seams lie where two of evenly spread centres are equally near. Across a seam the
+    /// later piece may leave only along its direction `s`: contacts are perpendicular to `s`, all around, or
+    /// face against it.
     fn new(n_pieces: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(13);
         let centers = spread(n_pieces);
@@ -67,7 +68,7 @@ impl Shell {
                 separation: separation.into(),
             })
             .collect();
-        // Only their boxes are asked for.
+        // Only their bounding boxes are used.
         let bodies = centers.iter().map(|&c| TriMesh {
             points: vec![c * RADIUS_MM],
             triangles: Vec::new(),
@@ -112,8 +113,8 @@ fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {
     }
 }
 
-/// The two nearest centers, and the place of their seam beside `at`; `None` where a third center is nearer to
-/// it.
+/// Two nearest centres, and the place of their seam beside `at`; `None` if a third centre is nearer to that
+/// place.
 fn seam_point(centers: &[Vec3], at: Vec3) -> Option<(usize, usize, Vec3)> {
     let nearest = |at: Vec3| {
         let mut order: Vec<usize> = (0..centers.len()).collect();

@@ -1,6 +1,6 @@
-//! Is this an assembly that locks? Two of boxes: a lid with a tongue and a pin through both, which does, and
-//! the same with a pin that is too short to reach into the base, which does not.
-//! `cargo run --release -p shellock-assembly --example verify_your_own`
+//! Verifies two assemblies of boxes. A lid with a tongue and a pin through both locks. The same assembly with
+//! a pin that is too short to reach into the base does not. Run with `cargo run --release -p
+//! shellock-assembly --example verify_your_own`.
 
 use shellock_assembly::{Assembly, Ctx, Direction, InstallationPlan, VerifyParams, verify};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
@@ -16,7 +16,7 @@ fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     })
 }
 
-/// The same with the clearance on all sides.
+/// Box enlarged by the clearance on all sides.
 fn room(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     let wide = |[low, high]: [f64; 2]| [low - CLEARANCE_MM, high + CLEARANCE_MM];
     cuboid(wide(x), wide(y), wide(z))

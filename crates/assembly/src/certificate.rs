@@ -1,10 +1,10 @@
-//! What is claimed of a finished kit, each claim with what a stranger needs to check it.
+//! Certificate of a finished kit: its claims, each with the data that an independent check needs.
 //!
-//! A verdict ([`mod@crate::verify`]) asks for trust in the program that made it. A certificate does not: it
-//! names the files by their hashes, and what is hard to find (which contacts hold the pieces, and with what
-//! forces) is written down, so that checking takes arithmetic only. The package `shellock-check` does that
-//! without any of this code. The format, the derivation and what is *not* proven are told in
-//! docs/notes/certificate.md.
+//! A verdict ([`mod@crate::verify`]) asks for trust in the program that made it. A certificate does not. It
+//! names the files by their hashes, and records the results that are hard to find: the contacts that hold the
+//! pieces, and their forces. Checking them takes arithmetic only. The package `shellock-check` does that
+//! without any of this code. docs/notes/certificate.md describes the format, the derivation and what is *not*
+//! proven.
 //!
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 
@@ -30,21 +30,21 @@ use bounded::bounded;
 pub use bounded::{BearingPoint, Bounded};
 use proof::{Proof, Question, prove};
 
-/// What [`Certificate::format`] says.
+/// Value of [`Certificate::format`] that marks a certificate.
 pub const FORMAT: &str = "shellock-certificate";
-/// What [`Certificate::version`] says: readers refuse what they do not know.
+/// Value of [`Certificate::version`]; readers reject versions that they do not know.
 pub const VERSION: u32 = 4;
 
-/// A file of a kit.
+/// File of a piece, with its hash and play.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceFile {
-    /// The piece.
+    /// Piece that the file holds.
     pub id: PatchId,
-    /// Its path within the kit.
+    /// Path of the file within the kit.
     pub file: String,
     /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
     pub sha256: String,
-    /// How far the piece moves while all others are held, where that is proven.
+    /// Play of the piece while all others are held, if it is proven.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub play: Option<Play>,
 }
@@ -52,51 +52,52 @@ pub struct PieceFile {
 /// Another file of a kit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OtherFile {
-    /// Its path within the kit.
+    /// Path of the file within the kit.
     pub file: String,
     /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
     pub sha256: String,
 }
 
-/// A place where one piece keeps another from coming nearer.
+/// Place where one piece keeps another from coming nearer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HoldingContact {
-    /// The piece the point lies on.
+    /// Piece that the point lies on.
     pub a: PatchId,
-    /// The piece it faces.
+    /// Piece that the point faces.
     pub b: PatchId,
-    /// The point.
+    /// Position of the contact, mm.
     pub point: [f64; 3],
-    /// Outward unit normal of `a` there, towards `b`.
+    /// Outward unit normal of `a` at the point, towards `b`.
     pub normal: [f64; 3],
-    /// Distance to `b`, mm.
+    /// Distance from the point to `b`, mm.
     pub gap_mm: f64,
 }
 
-/// How near two bodies come: the distance, and where.
+/// Least distance between two bodies, and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeastGap {
-    /// Distance, mm; negative where they overlap.
+    /// Distance between the bodies, mm; negative where they overlap.
     pub gap_mm: f64,
-    /// How far the moving one is from its place then, mm; 0 where nothing moves.
+    /// Travel of the moving body at that moment, mm; 0 if nothing moves.
     pub travel_mm: f64,
-    /// Where.
+    /// Place of the least distance, mm.
     pub at: [f64; 3],
-    /// The other piece.
+    /// Other piece of the pair.
     pub against: PatchId,
 }
 
-/// The least of some gaps: of whole surfaces, which touch at the outer rim, and beneath it.
+/// Least of several gaps, once for whole surfaces, which touch at the outer rim, and once for the part
+/// beneath the rim.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LeastGaps {
-    /// Of whole surfaces; `None` where that was not computed, or nothing comes within a millimetre.
+    /// Least gap of whole surfaces; `None` if it was not computed, or nothing comes within a millimetre.
     pub overall: Option<LeastGap>,
-    /// Of what lies beneath the rim.
+    /// Least gap of the part beneath the rim.
     pub beneath_rim: Option<LeastGap>,
 }
 
 impl LeastGaps {
-    /// The least of `gaps`: the other piece, overall and beneath the rim.
+    /// Least of `gaps`, overall and beneath the rim; each gap comes with its other piece.
     fn of(gaps: impl Iterator<Item = (PatchId, NearestPlace, Option<NearestPlace>)> + Clone) -> Self {
         let named = |against: PatchId, p: NearestPlace| LeastGap {
             gap_mm: p.gap_mm,
@@ -114,99 +115,101 @@ impl LeastGaps {
     }
 }
 
-/// One statement about a kit, with its proof where it needs one.
+/// One claim about a kit, with its proof where it needs one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "claim", rename_all = "kebab-case")]
 pub enum Claim {
-    /// Whatever pieces move, alone or together, by however little, while the held one does not: only `leaves`
-    /// can.
+    /// While the held piece does not move, only `leaves` can move: no other pieces can, alone or together, by
+    /// however little.
     Locked {
-        /// The piece that does not move; which one it is does not matter.
+        /// Piece that does not move; the choice of piece does not matter.
         held: Vec<PatchId>,
-        /// The key, which may move.
+        /// Key, which is allowed to move.
         leaves: PatchId,
-        /// Contacts, by their places in the certificate's list, with positive multipliers.
+        /// Contacts, by their indices in the certificate's list, with positive multipliers.
         multipliers: Vec<(usize, f64)>,
-        /// Length of the multipliers' sum of wrenches. Less than `hold`, which is the proof.
+        /// Length of the sum of the wrenches times their multipliers. Less than `hold`, which proves the
+        /// claim.
         residual: f64,
-        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1, that is
-        /// left for the other pieces.
+        /// Least singular value that remains for the other pieces, of the contacts' wrenches weighted by
+        /// their multipliers up to 1.
         hold: f64,
     },
-    /// Some pieces stay within their play on every path of motions of any size, at the clearance as it is.
+    /// Some pieces stay within their play on every path of motions of any size, at the given clearance.
     Bounded(Bounded),
-    /// The key can be taken out: it moves along `direction` and meets nothing.
+    /// The key can be removed: it moves along `direction` without collision.
     KeyLeaves {
-        /// The key.
+        /// Key of the kit.
         piece: PatchId,
-        /// Unit vector.
+        /// Unit vector of the motion.
         direction: [f64; 3],
-        /// Where it comes nearest to another piece on its whole way.
+        /// Least gaps to other pieces along the whole way.
         least: LeastGaps,
     },
-    /// The piece can be put in: along `direction` it comes to its place past all that are there already.
+    /// The piece can be installed: it reaches its place along `direction` past all pieces that are already
+    /// there.
     Installs {
-        /// The piece.
+        /// Piece that is installed.
         piece: PatchId,
-        /// Unit vector.
+        /// Unit vector of the motion.
         direction: [f64; 3],
-        /// Where it comes nearest to another piece on its whole way.
+        /// Least gaps to other pieces along the whole way.
         least: LeastGaps,
     },
     /// The assembled pieces do not overlap.
     Apart {
-        /// The least distance of all pairs.
+        /// Least gaps of all pairs of pieces.
         least: LeastGaps,
     },
 }
 
-/// What is claimed of a kit.
+/// Claims about a kit, with the data of their proofs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// [`FORMAT`].
+    /// Format of the file: [`FORMAT`].
     pub format: String,
-    /// [`VERSION`].
+    /// Version of the format: [`VERSION`].
     pub version: u32,
     /// Gap left between mating faces, mm.
     pub clearance_mm: f64,
-    /// Faces farther apart than this hold nothing, mm.
+    /// Greatest distance between faces that hold each other, mm.
     pub reach_mm: f64,
-    /// The point that twists are about.
+    /// Point that twists are about.
     pub center: [f64; 3],
-    /// Spins count as velocities at this distance, mm: half the diagonal of the kit.
+    /// Distance at which spins count as velocities, mm: half the diagonal of the kit.
     pub length_mm: f64,
-    /// The piece installed last.
+    /// Key: the piece installed last.
     pub key: PatchId,
-    /// First to last.
+    /// Order of installation, first to last.
     pub installation_order: Vec<PatchId>,
     /// All pieces, in order of their ids.
     pub pieces: Vec<PieceFile>,
-    /// Contacts with a part in the proof of the lock.
+    /// Contacts used in the proof of the lock.
     pub contacts: Vec<HoldingContact>,
-    /// Contacts with an area, with a part in a proof of play.
+    /// Contacts with an area, used in proofs of play.
     pub bearings: Vec<BearingPoint>,
-    /// How far the key may have slid while the play is proven.
+    /// Distance that the key may have slid for the play to be proven.
     pub slide: Option<Slide>,
-    /// Where the key is pressed on purpose: claims of gaps are but for these.
+    /// Places where the key is pressed on purpose; claims of gaps exclude them.
     #[serde(default)]
     pub press_fits: Vec<PressFit>,
-    /// The checks of the verification that failed, by name and figure: a kit with any is not to be printed.
+    /// Failed checks of the verification, by name and figure. A kit with any of them must not be printed.
     pub failed: Vec<String>,
-    /// Files besides the pieces' own.
+    /// Files besides those of the pieces.
     pub files: Vec<OtherFile>,
-    /// The claims.
+    /// All claims about the kit.
     pub claims: Vec<Claim>,
 }
 
 impl Certificate {
-    /// The same, where the key is pressed at these places on purpose.
+    /// Sets the places where the key is pressed on purpose.
     #[must_use]
     pub fn with_press_fits(mut self, press_fits: Vec<PressFit>) -> Self {
         self.press_fits = press_fits;
         self
     }
 
-    /// The same, with the hashes of other files.
+    /// Sets the hashes of other files.
     #[must_use]
     pub fn with_files(mut self, files: Vec<OtherFile>) -> Self {
         self.files = files;
@@ -214,24 +217,23 @@ impl Certificate {
     }
 }
 
-/// What was found of a finished kit.
+/// Results of examining a finished kit.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
-    /// Where its pieces touch, from [`crate::verify::examine`], and its verdict: what that speaks against is
-    /// not claimed.
+    /// Contacts between the pieces, from [`crate::verify::examine`].
     pub contacts: &'a [Contact],
-    /// The verdict.
+    /// Verdict of the same examination; claims that it contradicts are not made.
     pub verdict: &'a Verification,
-    /// How near pieces come; they go with the claims of paths.
+    /// Least gaps between pieces; they are reported with the claims of paths.
     pub gaps: &'a KitGaps,
-    /// How far pieces move, from [`crate::play::measure`]; where there is none, nothing is claimed of it.
+    /// Play of the pieces, from [`crate::play::measure`]; without it, no play is claimed.
     pub play: Option<&'a KitPlay>,
 }
 
-/// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says.
+/// Makes the claims that can be proven of finished `pieces`, written as `files` and installed by `plan`.
 ///
-/// `None` where the plan does not name every piece once, of at least two. Takes 0.04 s for 9 pieces with 12
-/// 000 contacts.
+/// `None` if the plan does not name every piece once, or there are fewer than two. Takes 0.04 s for 9 pieces
+/// with 12 000 contacts.
 pub fn certify(
     mut files: Vec<PieceFile>,
     pieces: &IdVec<PatchId, TriMesh>,
@@ -288,8 +290,8 @@ pub fn certify(
     })
 }
 
-/// The middle of all pieces and half their diagonal, mm: what twists are about, and at what distance spins
-/// count.
+/// Centre of all pieces and half their diagonal, mm: the point that twists are about, and the distance at
+/// which spins count.
 fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
     let bounds = pieces
         .as_slice()
@@ -298,7 +300,7 @@ fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
     (bounds.center(), 0.5 * bounds.diagonal())
 }
 
-/// The lock with its proof, if there is one: with the first piece held, nothing but the key moves.
+/// Claims the lock with its proof, if there is one: with the first piece held, only the key moves.
 fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, length_mm: f64) -> Option<Claim> {
     let centered: Vec<Contact> = contacts
         .iter()
@@ -334,8 +336,8 @@ fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, lengt
     })
 }
 
-/// That the key leaves, that all but the first piece can be installed, and that nothing overlaps: as far as
-/// the verdict found nothing against it.
+/// Claims that the key leaves, that all but the first piece can be installed, and that nothing overlaps, as
+/// far as the verdict has no finding against it.
 fn claim_paths(plan: &InstallationPlan, verdict: &Verification, gaps: &KitGaps) -> Vec<Claim> {
     let is_free = |id: PatchId| {
         let rubs = |f: &Finding| matches!(f, Finding::PathRubs { piece, .. } if *piece == id);
@@ -376,7 +378,7 @@ fn claim_paths(plan: &InstallationPlan, verdict: &Verification, gaps: &KitGaps) 
     claims
 }
 
-/// The contacts that proofs name; the proofs then name them by their new places.
+/// Keeps the contacts that proofs use, and renumbers them in the proofs.
 fn keep_holding(contacts: &[Contact], claims: &mut [Claim]) -> Vec<HoldingContact> {
     let named = |claim: &Claim| match claim {
         Claim::Locked { multipliers, .. } => multipliers.iter().map(|m| m.0).collect(),

@@ -1,32 +1,32 @@
-//! What every stage gets first: where to say how far it is, where to warn, and whether to stop.
+//! Context that every stage receives: progress, warnings and cancellation.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::Warning;
 
-/// The user asked to stop; nothing was kept.
+/// Error: the user requested a stop, and nothing was kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped by the user")]
 pub struct Cancelled;
 
-/// How far the job is.
+/// Progress report of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress<'a> {
-    /// A stage begins, with so many steps (0 where unknown).
+    /// A stage begins, with its number of steps (0 if unknown).
     Stage {
-        /// What a person reads.
+        /// Name of the stage, for people.
         name: &'a str,
-        /// Steps to come.
+        /// Number of steps to come.
         n_steps: usize,
     },
     /// One more step of the current stage is done.
     Step,
-    /// A line worth keeping, such as why another round begins.
+    /// A line worth keeping, such as the reason for another round.
     Note(&'a str),
 }
 
-/// Progress, cancellation and warnings of one job. Stages borrow it and never keep it.
+/// Progress, cancellation and warnings of one job. Stages borrow the context and never keep it.
 pub struct Ctx<'a> {
     report: &'a (dyn Fn(Progress<'_>) + Sync),
     stop: &'a AtomicBool,
@@ -36,7 +36,7 @@ pub struct Ctx<'a> {
 }
 
 impl<'a> Ctx<'a> {
-    /// A context that tells `report` how far it is and ends soon after `stop` becomes true.
+    /// Creates a context that reports progress to `report` and stops soon after `stop` becomes true.
     pub fn new(report: &'a (dyn Fn(Progress<'_>) + Sync), stop: &'a AtomicBool) -> Self {
         Self {
             report,
@@ -47,16 +47,16 @@ impl<'a> Ctx<'a> {
         }
     }
 
-    /// A context that tells nobody and is never stopped.
+    /// Creates a context that reports nothing and is never stopped.
     pub fn quiet() -> Ctx<'static> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Ctx::new(&|_| {}, &NEVER)
     }
 
-    /// The same with a clock, which libraries do not read: searches that get better with time end soon after
-    /// it says true.
+    /// Adds a clock, since libraries do not read one: searches that improve with time end soon after it
+    /// returns true.
     ///
-    /// What they return then depends on how fast the machine is, so limits of work should end them before.
+    /// Their results then depend on the speed of the machine, so limits of work should end them earlier.
     pub fn with_time_limit(self, is_time_up: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self {
             is_time_up: Some(is_time_up),
@@ -64,10 +64,10 @@ impl<'a> Ctx<'a> {
         }
     }
 
-    /// The same with a clock that says how many seconds the whole job may still take: what is made again and again
-    /// until it is good is not begun anew where that would end too late.
+    /// Adds a clock of the seconds left for the whole job. A stage that retries until its result is good does
+    /// not start again if that would end too late.
     ///
-    /// What comes of the job then depends on how fast the machine is; it is warned of.
+    /// The result of the job then depends on the speed of the machine; a warning reports this.
     pub fn with_deadline(self, seconds_left: &'a (dyn Fn() -> f64 + Sync)) -> Self {
         Self {
             seconds_left: Some(seconds_left),
@@ -75,34 +75,34 @@ impl<'a> Ctx<'a> {
         }
     }
 
-    /// Seconds that the whole job may still take; no end where there is no clock.
+    /// Seconds left for the whole job; infinite without a clock.
     pub fn seconds_left(&self) -> f64 {
         self.seconds_left.map_or(f64::INFINITY, |left| left())
     }
 
-    /// Whether to be content with what was found.
+    /// Returns true if searches should settle for their present result.
     pub fn is_time_up(&self) -> bool {
         self.is_time_up.is_some_and(|is_up| is_up())
     }
 
-    /// A stage of `n_steps` steps begins (0: unknown); fails where the user asked to stop.
+    /// Starts a stage of `n_steps` steps (0: unknown). Fails if the user requested a stop.
     pub fn stage(&self, name: &str, n_steps: usize) -> Result<(), Cancelled> {
         (self.report)(Progress::Stage { name, n_steps });
         self.check()
     }
 
-    /// One step of the stage is done; fails where the user asked to stop.
+    /// Completes one step of the stage. Fails if the user requested a stop.
     pub fn step(&self) -> Result<(), Cancelled> {
         (self.report)(Progress::Step);
         self.check()
     }
 
-    /// A line worth keeping.
+    /// Reports a line worth keeping.
     pub fn note(&self, text: &str) {
         (self.report)(Progress::Note(text));
     }
 
-    /// Fails where the user asked to stop; long loops call it now and then.
+    /// Fails if the user requested a stop; long loops call it regularly.
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.stop.load(Ordering::Relaxed) {
             Err(Cancelled)
@@ -119,7 +119,7 @@ impl<'a> Ctx<'a> {
             .push(warning);
     }
 
-    /// A context of the same job whose warnings are its own: what is given up takes them with it.
+    /// Creates a context of the same job with its own warnings: a discarded attempt takes them with it.
     pub fn fork(&self) -> Ctx<'a> {
         Ctx {
             report: self.report,
@@ -130,7 +130,7 @@ impl<'a> Ctx<'a> {
         }
     }
 
-    /// The warnings, in the order they came; equal ones once.
+    /// Returns the warnings in the order they came, without duplicates.
     pub fn into_warnings(self) -> Vec<Warning> {
         let mut seen: Vec<Warning> = Vec::new();
         for w in self.warnings.into_inner().expect("no holder of this lock panics") {

@@ -1,19 +1,19 @@
-//! Directions along which pieces come and go: any, and the 26 that plans choose from (Sect. 6.2).
+//! Directions along which pieces move in and out: any, and the 26 that plans choose from (Sect. 6.2).
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
-/// A unit vector.
+/// Unit vector of a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction(Vec3);
 
 impl Direction {
-    /// The direction of `v`; `None` where it has none: zero, or not finite.
+    /// Direction of `v`; `None` if `v` is zero or not finite.
     pub fn of(v: Vec3) -> Option<Self> {
         v.try_normalize().map(Self)
     }
 
-    /// The vector, of length 1.
+    /// Vector of the direction, of length 1.
     pub fn unit(self) -> Vec3 {
         self.0
     }
@@ -32,10 +32,10 @@ impl From<LatticeDirection> for Direction {
 pub struct LatticeDirection(u8);
 
 impl LatticeDirection {
-    /// How many there are.
+    /// Number of lattice directions, 26.
     pub const COUNT: usize = 26;
 
-    /// All of them, in order of their index.
+    /// All lattice directions, in order of their index.
     pub fn all() -> impl Iterator<Item = Self> + Clone {
         (0..Self::COUNT as u8).map(Self)
     }
@@ -45,7 +45,7 @@ impl LatticeDirection {
         self.0 as usize
     }
 
-    /// The direction at this position in [`Self::all`].
+    /// Direction at this position in [`Self::all`]; `None` from 26 on.
     pub fn from_index(index: usize) -> Option<Self> {
         u8::try_from(index)
             .ok()
@@ -53,7 +53,7 @@ impl LatticeDirection {
             .map(Self)
     }
 
-    /// The step to the neighbouring cell: components in {−1, 0, 1}, not all 0.
+    /// Step to the neighbouring cell: components in {−1, 0, 1}, not all 0.
     pub fn step(self) -> [i32; 3] {
         // Cell 13 of the 3 × 3 × 3 block is the middle, which is no direction.
         let cell = i32::from(self.0) + i32::from(self.0 >= 13);
@@ -66,12 +66,12 @@ impl LatticeDirection {
         Vec3::new(f64::from(x), f64::from(y), f64::from(z)).normalize()
     }
 
-    /// The direction that points the other way.
+    /// Direction that points the opposite way.
     pub fn opposite(self) -> Self {
         Self(25 - self.0)
     }
 
-    /// The direction nearest to `v`; the lowest index where several are.
+    /// Direction nearest to `v`; the lowest index in case of a tie.
     pub fn nearest(v: Vec3) -> Self {
         let mut best = Self(0);
         for d in Self::all() {

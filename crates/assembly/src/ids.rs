@@ -1,23 +1,25 @@
-//! Names of pieces, and arrays that can only be indexed by them.
+//! Ids of pieces, and arrays that can only be indexed by them.
 
 use std::marker::PhantomData;
 use std::ops::{Index, IndexMut};
 
 use serde::{Deserialize, Serialize};
 
-/// A patch of the outer surface, and the piece that carries it: its place in a list, from 0. People and files
-/// count from 1: [`Self::number`], which is also what is printed and what serde writes and reads.
+/// Id of a patch of the outer surface, and of the piece that carries it: its index in a list, from 0.
+///
+/// People and files count from 1: [`Self::number`] is the number that is printed, and that serde writes and
+/// reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "u32", try_from = "u32")]
 pub struct PatchId(pub u32);
 
 impl PatchId {
-    /// What people call it, from 1.
+    /// Number of the piece for people, from 1.
     pub fn number(self) -> u32 {
         self.0.saturating_add(1)
     }
 
-    /// The piece that people call so; `None` for 0.
+    /// Piece with this number for people; `None` for 0.
     pub fn numbered(number: u32) -> Option<Self> {
         number.checked_sub(1).map(Self)
     }
@@ -55,7 +57,7 @@ impl std::fmt::Display for PatchId {
     }
 }
 
-/// A `Vec<T>` with one element an id, indexed by the id alone.
+/// A `Vec<T>` with one element per id, indexed by the id alone.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct IdVec<I, T> {
@@ -65,17 +67,17 @@ pub struct IdVec<I, T> {
 }
 
 impl<I: From<usize> + Into<usize>, T> IdVec<I, T> {
-    /// One element for each of `n` ids, made from the id.
+    /// Builds a vector of `n` elements, each made from its id.
     pub fn from_fn(n: usize, make: impl FnMut(I) -> T) -> Self {
         (0..n).map(I::from).map(make).collect()
     }
 
-    /// How many ids there are.
+    /// Number of ids in the vector.
     pub fn len(&self) -> usize {
         self.items.len()
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no ids.
     pub fn is_empty(&self) -> bool {
         self.items.is_empty()
     }
@@ -90,7 +92,7 @@ impl<I: From<usize> + Into<usize>, T> IdVec<I, T> {
         self.items.iter().enumerate().map(|(i, x)| (I::from(i), x))
     }
 
-    /// The elements in order of their ids.
+    /// Elements in order of their ids.
     pub fn as_slice(&self) -> &[T] {
         &self.items
     }

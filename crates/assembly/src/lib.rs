@@ -1,11 +1,12 @@
-//! Is this an assembly that locks? Pieces as closed meshes, the order in which they are put together and the
-//! direction of each go in; a verdict, the play of the pieces and a certificate of both come out.
+//! Verification of assemblies that should lock. The input is the pieces as closed meshes, the order of
+//! installation and the direction of each. The output is a verdict, the play of the pieces and a certificate
+//! of both.
 //!
-//! Nothing here knows how the pieces were made. [`mod@verify`] judges at rest and on the ways out, [`motion`]
-//! holds contacts as inequalities, [`play`] bounds motions of any size, [`certificate`] writes the proofs
-//! down. [`verify()`] does it all.
+//! Nothing here knows how the pieces were made. [`mod@verify`] judges the pieces at rest and on their ways
+//! out, [`motion`] treats contacts as inequalities, [`play`] bounds motions of any size, and [`certificate`]
+//! records the proofs. [`verify()`] does all of it.
 //!
-//! A block that nothing keeps from being lifted out of its tray is no lock:
+//! A block that can be lifted freely out of its tray is no lock:
 //!
 //! ```
 //! use shellock_assembly::{Assembly, Ctx, Direction, InstallationPlan, VerifyParams, verify};

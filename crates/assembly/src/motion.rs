@@ -1,15 +1,15 @@
-//! Whether any pieces can move at all, alone or together, by however little.
+//! Infinitesimal mobility: decides if any pieces can move at all, alone or together.
 //!
 //! A motion gives each free piece a velocity (and a spin). A contact with normal `n` from `a` to `b` allows
-//! it where `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only
+//! the motion if `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only
 //! solution.
 //!
 //! With `b = Aᵀ1 / m`, the least-norm point `r = b + Aᵀμ`, `μ ≥ 0`, decides everything (the alternatives of
-//! Stiemke): where `r = 0` the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x =
-//! 0` and only a null space of `A` can move; otherwise `x = −r` is a motion that opens contacts. For every
+//! Stiemke). If `r = 0`, the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x = 0`
+//! and only a null space of `A` can move. Otherwise `x = −r` is a motion that opens contacts. For every
 //! motion with `|x| ≤ 1`, `−1ᵀA x ≤ m ‖r‖₁`, which bounds the linear program of an outside judge. `r` is
 //! found by non-negative least squares [LawsonHanson1974, ch. 23] on a Cholesky factor of the active
-//! contacts, never more of them than unknowns.
+//! contacts, which are never more than the unknowns.
 
 mod forces;
 mod play;
@@ -25,30 +25,32 @@ use crate::PatchId;
 pub(crate) use play::{Corner, Limits};
 pub(crate) use system::{Row, System};
 
-/// A point of piece `a` that piece `b` lies against.
+/// Point of piece `a` that piece `b` lies against.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
-    /// The piece the point is on.
+    /// Piece that the point lies on.
     pub a: PatchId,
-    /// The piece it faces.
+    /// Piece that the point faces.
     pub b: PatchId,
-    /// Position, mm.
+    /// Position of the point, mm.
     pub point: Vec3,
     /// Unit normal of `a` at the point, towards `b`.
     pub normal: Vec3,
-    /// Distance to `b`, mm.
+    /// Distance from the point to `b`, mm.
     pub gap_mm: f64,
-    /// Area of `a` that the point stands for, mm².
+    /// Area of `a` that the point represents, mm².
     pub area_mm2: f64,
 }
 
-/// How many times farther than [`most_play`] a piece may go before it counts as loose.
+/// Multiple of [`most_play`] from which a piece counts as loose.
 pub const LOOSE: f64 = 2.0;
 
-/// How far a piece may go before it is said to rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of
-/// 0.12 mm, in proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
-/// turns of pieces with a diagonal under 60 mm, whose rims move less, in inverse proportion to that, up to
-/// twice. docs/notes/certificate.md has the evidence.
+/// Play above which a piece counts as rattling, mm and degrees.
+///
+/// The reference is 1 mm and 2° for a model of 150 mm and a clearance of 0.12 mm. Both values grow in
+/// proportion to a larger clearance. The displacement also scales with the size of the model, but is no less
+/// than for 75 mm. Rotations of pieces with a diagonal under 60 mm, whose rims move less, scale inversely
+/// with the diagonal, up to twice. docs/notes/certificate.md has the evidence.
 pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
     const AT_MM: f64 = 150.0;
     const AT_CLEARANCE_MM: f64 = 0.12;
@@ -60,31 +62,33 @@ pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
     ]
 }
 
-/// Which motions of a piece are considered.
+/// Motions of a piece that are considered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
-    /// Three components of velocity.
+    /// Translations only: three components of velocity.
     Translations,
-    /// Velocity and spin.
+    /// Velocity and spin, six components.
     Rigid,
 }
 
-/// The motion of one piece.
+/// Motion of one piece, as velocity and spin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist {
-    /// The piece.
+    /// Piece that performs the motion.
     pub piece: PatchId,
-    /// Velocity of the piece at the origin, the fastest component of the whole motion being 1.
+    /// Velocity of the piece at the origin, scaled so that the fastest component of the whole motion is 1.
     pub velocity: Vec3,
     /// Spin times the scale given to [`free_motion`].
     pub spin: Vec3,
 }
 
-/// How far small motions take a piece within its contacts while its neighbours rest: the displacement of
-/// `middle`, mm, and the turn, degrees; each along the axes of space, taken together. What has no end goes
-/// 100 mm and 1 rad.
+/// Greatest small motion of a piece within its contacts while its neighbours rest: displacement of `middle`,
+/// mm, and rotation, degrees.
+///
+/// Each is the length of the vector of the greatest values along the coordinate axes. Unlimited motions count
+/// as 100 mm and 1 rad.
 pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
-    /// Turns count as displacements at this distance, mm.
+    /// Distance at which rotations count as displacements, mm.
     const LENGTH_MM: f64 = 50.0;
     const ENDLESS: [f64; 2] = [100.0, 1.0];
     if contacts.is_empty() {
@@ -122,11 +126,11 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
     ]
 }
 
-/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot. With `leaves`, that piece
-/// may move as it likes, and only motions in which others move count.
+/// Finds how the pieces not in `held` (of `n_pieces`) can move; empty if they cannot. With `leaves`, that
+/// piece may move freely, and only motions in which others move count.
 ///
-/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. All free pieces count as
-/// moving where there is no contact.
+/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. Without contacts, all free
+/// pieces count as moving.
 pub fn free_motion(
     contacts: &[Contact],
     n_pieces: usize,
@@ -156,13 +160,13 @@ pub fn free_motion(
     }
 }
 
-/// A motion in which pieces but `leaves` move; `None` where there is none.
+/// Finds a motion in which pieces other than `leaves` move; `None` if there is none.
 ///
-/// A cone that is more than 0 in their unknowns shows along almost any direction or its opposite; three are
-/// tried.
+/// A cone that is more than 0 in their unknowns is found along almost any direction or its opposite; three
+/// are tried.
 fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<DVector<f64>> {
-    /// Others move where they get so far of the 1000 mm that motions end at; gaps that are 0 are taken as
-    /// some nanometres.
+    /// Least displacement that counts as a motion of others, of the 1000 mm at which motions end; gaps that
+    /// are 0 are taken as some nanometres.
     const MOVED_MM: f64 = 0.5;
     let limits = Limits::new(system, &vec![0.0; system.rows.len()]);
     let mut corner = Corner::new(&limits);
@@ -216,7 +220,7 @@ mod tests {
         contacts
     }
 
-    /// The outside judge's own program: the most that contacts can open, over their number.
+    /// The outside judge's own program: the greatest total opening of the contacts, divided by their number.
     fn opening_by_simplex(system: &System) -> f64 {
         let mut base = DVector::zeros(system.n);
         system.rows.iter().for_each(|row| system.add(row, 1.0, &mut base));
@@ -267,7 +271,7 @@ mod tests {
         assert!(n_locked > 5 && n_open > 5, "{n_locked} locked, {n_open} open");
     }
 
-    /// The greatest `objective · x` in the box of ±1000 mm; `gaps_mm` one a row.
+    /// Greatest `objective · x` in the box of ±1000 mm, with `gaps_mm` one a row.
     fn farthest_by_simplex(system: &System, gaps_mm: &[f64], objective: &DVector<f64>) -> f64 {
         let mut problem = Problem::new(OptimizationDirection::Maximize);
         let x: Vec<_> = objective
@@ -331,7 +335,7 @@ mod tests {
         );
     }
 
-    /// Contacts on the six faces of a box around `center`, normals outwards.
+    /// Contacts on the six faces of a box around `center`, with normals outwards.
     fn box_contacts(a: u32, b: u32, center: Vec3) -> Vec<Contact> {
         let mut contacts = Vec::new();
         for (n, u, v) in [

@@ -1,23 +1,23 @@
-//! What is wrong with a parameter.
+//! Errors of parameters outside their range.
 
 /// A parameter outside its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {}; it must lie between {min} and {}", with_unit(*value, unit), with_unit(*max, unit))]
 pub struct ParamProblem {
-    /// What people call it.
+    /// Name of the parameter, for people.
     pub name: &'static str,
-    /// Its unit; empty where it has none.
+    /// Unit of the parameter; empty if it has none.
     pub unit: &'static str,
-    /// What was given.
+    /// Value that was given.
     pub value: f64,
-    /// Least allowed value.
+    /// Least value that is allowed.
     pub min: f64,
-    /// Greatest allowed value.
+    /// Greatest value that is allowed.
     pub max: f64,
 }
 
 impl ParamProblem {
-    /// The problem, unless `value` lies in [`min`, `max`]. NaN is a problem.
+    /// Returns the problem, unless `value` lies in [`min`, `max`]. NaN is a problem.
     pub fn unless_within(
         name: &'static str,
         unit: &'static str,

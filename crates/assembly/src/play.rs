@@ -1,20 +1,20 @@
-//! How far the pieces of a finished kit can go, proven for rigid motions of any size.
+//! Play of the pieces of a finished kit, proven for rigid motions of any size.
 //!
-//! The lock of [`crate::certificate`] is one of faces that touch. Printed faces are a clearance apart, and
-//! what has room can be turned past a short connector. Here the clearance counts: contacts are taken with an
-//! area, and a linear program over all of them bounds what pieces can do on any path from rest, first each
-//! piece while all others are held, then all together with one held. docs/notes/certificate.md has the
-//! theorem; the proofs go into the certificate.
+//! The lock of [`crate::certificate`] is one of touching faces. Printed faces are a clearance apart, and a
+//! piece with room can be turned past a short connector. Here the clearance counts. Contacts are taken with
+//! an area, and a linear program over all of them bounds the pieces on any path from rest: first each piece
+//! while all others are held, then all together with one held. docs/notes/certificate.md has the theorem; the
+//! proofs go into the certificate.
 //!
 //! ```text
 //!  surfaces ─► bearings ─► bounds ─► KitPlay
-//!             (points with   (assume, look how high barriers are,
+//!             (points with   (assume, find heights of barriers,
 //!              barriers)      solve, widen, until it closes)
 //! ```
 //!
-//! Limits: rigid pieces; bearings are sampled, so the play that is proven is more than the real one (by a
-//! third to twice in kits); where no proof closes the play is that of the first, linear program, which is
-//! less than the real one may be.
+//! Limits: pieces are rigid. Bearings are sampled, so the proven play is more than the real one (by a third
+//! to twice in kits). If no proof closes, the reported play is that of the first, linear program, which may
+//! be less than the real one.
 
 mod barrier;
 mod bearing;
@@ -41,24 +41,25 @@ pub use bound::{Multipliers, Proof, Slide};
 pub use quantity::Quantity;
 use way_out::Walk;
 
-/// How far the key may slide on its way out before what is proven ends, mm: friction, ribs or a detent keep
-/// it nearer.
+/// Distance that the key may slide on its way out within the proofs, mm: friction, ribs or a detent hold it
+/// closer.
 pub const SLIDE_MM: f64 = 0.3;
 
-/// How play is measured.
+/// Parameters for measuring play.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayParams {
     /// Gap left between mating faces, mm. [0, 1].
     pub clearance_mm: f64,
-    /// How far the key may have slid on its way out, mm: what friction, ribs or a detent keep. (0, 0.5]; 0.3.
+    /// Distance that the key may have slid on its way out, mm: friction, ribs or a detent hold it within. (0,
+    /// 0.5]; 0.3.
     pub slide_mm: f64,
-    /// Whether also all pieces together are looked at, where each alone is proven; takes some seconds.
+    /// True to also bound all pieces together if each alone is proven; takes some seconds.
     pub is_together: bool,
-    /// Where sample points fall; any number.
+    /// Seed of the sample points; any number.
     pub seed: u64,
 }
 
-/// Displacement, mm, and turn, rad.
+/// Play from a displacement, mm, and a rotation, rad.
 fn play_of([shift_mm, turn]: [f64; 2], is_proven: bool) -> Play {
     Play {
         translation_mm: shift_mm,
@@ -67,35 +68,36 @@ fn play_of([shift_mm, turn]: [f64; 2], is_proven: bool) -> Play {
     }
 }
 
-/// A piece, and poses from rest on that take it out: displacement of the centroid, mm, and rotation vector,
-/// rad.
+/// Piece, and poses that take it out, starting from rest: displacement of the centroid, mm, and rotation
+/// vector, rad.
 pub type WayOut = (PatchId, Vec<[f64; 6]>);
 
-/// The play of a kit's pieces, with its proofs.
+/// Play of a kit's pieces, with its proofs.
 #[derive(Clone, Debug)]
 pub struct KitPlay {
-    /// What holds while the key has slid no farther.
+    /// Slide of the key up to which the results hold.
     pub slide: Slide,
-    /// The points that proofs name.
+    /// Bearings that the proofs refer to.
     pub bearings: Vec<Bearing>,
-    /// Of each piece while all others are held; `None` where nothing ends its motions.
+    /// Play of each piece while all others are held; `None` if nothing limits its motions.
     pub alone: IdVec<PatchId, Option<Play>>,
-    /// The same for small motions, as if sideways moves and turns changed nothing: nearer to the real play
-    /// than what is proven, but on its lower side.
+    /// Play of each piece for small motions, neglecting the effects of sideways motions and rotations. Closer
+    /// to the real play than the proven one, but on its lower side.
     pub estimates: IdVec<PatchId, Option<Play>>,
-    /// Small motions of each piece that go that far: displacement of its centroid, mm, and turn, rad.
+    /// Small motions of each piece that reach this play: displacement of its centroid, mm, and rotation, rad.
     pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
-    /// Ways on which pieces can be taken out by hand though they are not the key; `None` where nobody looked,
-    /// see [`look_for_ways_out`].
+    /// Ways on which pieces other than the key can be taken out by hand. `None` if no search was made, see
+    /// [`look_for_ways_out`].
     pub ways_out: Option<Vec<WayOut>>,
-    /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
+    /// Play of each piece while all but one move; `None` for the one that is held. Missing if it is not
+    /// proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
-    /// One for each piece whose play is proven, in order, then that of all together.
+    /// Proofs: one for each piece whose play is proven, in order, then that of all together.
     pub proofs: Vec<Proof>,
 }
 
 impl Proof {
-    /// What it proves of each free piece.
+    /// Play that the proof gives for each free piece.
     pub fn plays(&self) -> impl Iterator<Item = (PatchId, Play)> + '_ {
         let norm = |q: usize| self.quantities[q].norm();
         let play = move |(&p, &[turn, shift]): (&PatchId, &[usize; 2])| {
@@ -105,9 +107,11 @@ impl Proof {
     }
 }
 
-/// Measures the play of finished `pieces` that are installed as `plan` says, whose last step is the key. A
-/// function of its arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor time.
-/// Ways out are not looked for.
+/// Measures the play of finished `pieces` that are installed by `plan`, whose last step is the key. Ways out
+/// are not searched.
+///
+/// A function of its arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor
+/// time.
 pub fn measure(
     ctx: &Ctx,
     params: &PlayParams,
@@ -142,7 +146,8 @@ pub fn measure(
         .par_iter()
         .map(|&id| solve(&bearings, Candidates::All, id))
         .collect::<Result<_, Cancelled>>()?;
-    // Where that is not enough, more points are: the best of them are nearer to the ends of short connectors.
+    // If that is not enough, more points are sampled: the best of them are nearer to the ends of short
+    // connectors.
     let again: Vec<PatchId> = ids
         .iter()
         .copied()
@@ -199,9 +204,9 @@ pub fn measure(
     })
 }
 
-/// Looks for ways out of the `pieces` that `play` has no proof for; the key's is no secret. A function of its
-/// arguments alone, on any number of threads. A piece takes 2 to 4 s of processor time: it is for kits that
-/// pass all else.
+/// Searches for ways out of the `pieces` for which `play` has no proof; the key's way out is known. A
+/// function of its arguments alone, on any number of threads. A piece takes 2 to 4 s of processor time, so
+/// this is for kits that pass all other checks.
 pub fn look_for_ways_out(
     ctx: &Ctx,
     clearance_mm: f64,
@@ -227,8 +232,8 @@ pub fn look_for_ways_out(
     Ok(())
 }
 
-/// How far each piece goes, for small motions as in [`KitPlay::estimates`], where every printed face stands
-/// back by `set_back_mm`; `None` where nothing ends its motions. Takes a second of processor time.
+/// Play of each piece for small motions as in [`KitPlay::estimates`], if every printed face is set back by
+/// `set_back_mm`; `None` if nothing limits its motions. Takes a second of processor time.
 pub fn printed_thin(
     ctx: &Ctx,
     pieces: &IdVec<PatchId, TriMesh>,
@@ -258,17 +263,17 @@ pub fn printed_thin(
     Ok(plays.into_iter().collect())
 }
 
-/// All but the piece that touches others at most points: held, it leaves the others least room.
+/// All pieces but the one that touches others at most points: held, it leaves the others least room.
 fn all_but_one(ids: &[PatchId], bearings: &[Bearing]) -> Vec<PatchId> {
     let n_points = |id: PatchId| bearings.iter().filter(|b| b.a == id || b.b == id).count();
-    // The first of equals.
+    // Ties go to the first piece.
     let held = ids.iter().rev().copied().max_by_key(|&id| n_points(id));
     ids.iter().copied().filter(|&id| Some(id) != held).collect()
 }
 
-/// Whether a proof that does not close may do so with more points.
+/// Returns true if a proof that does not close may do so with more points.
 fn is_close(answer: &Answer) -> bool {
-    /// Displacement, mm, and turn, rad, of small motions from which that is hopeless.
+    /// Small motions from which more points are hopeless: displacement, mm, and rotation, rad.
     const HOPELESS: [f64; 2] = [1.2, 0.05];
     let is_hopeless = answer
         .linear
@@ -277,7 +282,7 @@ fn is_close(answer: &Answer) -> bool {
     answer.proof.is_err() && !is_hopeless
 }
 
-/// What an answer says of the one piece that was free.
+/// Play of the only free piece, from an answer.
 fn alone(answer: &Answer) -> Option<Play> {
     match &answer.proof {
         Ok(proof) => proof.plays().next().map(|(_, play)| play),
@@ -285,7 +290,7 @@ fn alone(answer: &Answer) -> Option<Play> {
     }
 }
 
-/// The key's way out, against the piece that it bears on at most points.
+/// Slide of the key along its way out, against the piece that shares most bearings with it.
 fn slide(
     params: &PlayParams,
     plan: &InstallationPlan,
@@ -297,7 +302,7 @@ fn slide(
     for b in bearings.iter().filter(|b| b.a == key || b.b == key) {
         *n_points.entry(if b.a == key { b.b } else { b.a }).or_default() += 1;
     }
-    // The first of equals.
+    // Ties go to the first piece.
     let seat = n_points
         .iter()
         .rev()
@@ -313,22 +318,22 @@ fn slide(
     }
 }
 
-/// A piece that goes farther than [`most_play`] says.
+/// Piece with more play than [`most_play`] allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rattle {
-    /// The piece.
+    /// Piece that has too much play.
     pub piece: PatchId,
-    /// How far it goes, estimated for small motions: what is proven is more than the real play.
+    /// Play of the piece, estimated for small motions, since the proven play is more than the real one.
     pub play: Play,
-    /// How far it may go before it is said to rattle, mm and degrees.
+    /// Play above which the piece counts as rattling, mm and degrees.
     pub most: [f64; 2],
-    /// How many times as far it goes, > 1.
+    /// Ratio of the play to that limit, > 1.
     pub excess: f64,
-    /// Its middle.
+    /// Centroid of the piece, mm.
     pub at: [f64; 3],
 }
 
-/// The pieces of a model of `size_mm` that rattle, the loosest first.
+/// Pieces of a model of `size_mm` that rattle, the loosest first.
 pub fn rattles(
     play: &KitPlay,
     pieces: &IdVec<PatchId, TriMesh>,
@@ -352,7 +357,7 @@ pub fn rattles(
     wide
 }
 
-/// Whether no piece is loose: no one that rattles does so [`LOOSE`] times as far as it may.
+/// Checks that no piece is loose: that no piece rattles by [`LOOSE`] times its limit.
 pub fn check(play: &KitPlay, rattles: &[Rattle]) -> (Check, Vec<Finding>) {
     let loose = rattles.iter().filter(|r| r.excess > LOOSE);
     let findings: Vec<Finding> = loose
@@ -374,7 +379,7 @@ pub fn check(play: &KitPlay, rattles: &[Rattle]) -> (Check, Vec<Finding>) {
     )
 }
 
-/// Says which pieces rattle though they are not loose.
+/// Warns of the pieces that rattle but are not loose.
 pub fn warning_of_rattles(rattles: &[Rattle]) -> Option<Warning> {
     let told: Vec<&Rattle> = rattles.iter().filter(|r| r.excess <= LOOSE).collect();
     let loosest = told.first()?;
@@ -390,7 +395,7 @@ pub fn warning_of_rattles(rattles: &[Rattle]) -> Option<Warning> {
     })
 }
 
-/// Whether no piece but the key was found to come out by hand; `None` where nobody looked.
+/// Checks that no piece but the key was found to come out by hand; `None` if no search was made.
 pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> Option<(Check, Vec<Finding>)> {
     let found = |(piece, _): &WayOut| Finding::ComesOut {
         piece: *piece,
@@ -415,7 +420,7 @@ pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> Optio
     ))
 }
 
-/// The pieces of which it is neither proven how far they go nor found that they come out, with the figures of
+/// Warns of the pieces whose play is not proven and that were not found to come out, with the figures of
 /// small motions.
 pub fn warning(play: &KitPlay) -> Option<Warning> {
     let comes_out = |id: PatchId| play.ways_out.iter().flatten().any(|way| way.0 == id);
@@ -438,7 +443,7 @@ pub fn warning(play: &KitPlay) -> Option<Warning> {
     })
 }
 
-/// The widest play, for people.
+/// Widest play of the kit as a phrase, for people.
 pub fn words(play: &KitPlay) -> String {
     let Some((loosest, widest)) = play.loosest() else {
         return "some piece has no end of its play".into();
@@ -466,7 +471,7 @@ pub fn words(play: &KitPlay) -> String {
 }
 
 impl KitPlay {
-    /// The pieces without a proof of how far they go.
+    /// Pieces without a proof of their play.
     pub fn unproven(&self) -> impl Iterator<Item = PatchId> + '_ {
         self.alone
             .iter()
@@ -474,7 +479,7 @@ impl KitPlay {
             .map(|(id, _)| id)
     }
 
-    /// The piece that moves farthest; `None` where some piece has no end.
+    /// Piece with the widest play; `None` if some piece has no limit.
     pub fn loosest(&self) -> Option<(PatchId, Play)> {
         let all: Vec<(PatchId, Play)> = self
             .alone

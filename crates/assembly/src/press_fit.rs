@@ -1,14 +1,14 @@
-//! Places where pieces press on each other on purpose.
+//! Press fits: places where pieces press on each other on purpose.
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
 use crate::PatchId;
 
-/// Detents and ribs are no larger than this around their places, mm.
+/// Greatest extent of detents and ribs around their places, mm.
 const REACH_MM: f64 = 4.0;
 
-/// What presses on purpose.
+/// Kind of a press fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PressFitKind {
@@ -18,26 +18,26 @@ pub enum PressFitKind {
     Rib,
 }
 
-/// A place where the key is held by being pressed.
+/// Place where pressing holds the key.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PressFit {
-    /// Which kind it is.
+    /// Kind of the press fit.
     pub kind: PressFitKind,
-    /// The piece that it stands on.
+    /// Piece that carries the bump or rib.
     pub piece: PatchId,
-    /// Its place, mm.
+    /// Place of the press fit, mm.
     pub at: [f64; 3],
-    /// By how much it presses on the other piece on the way in, mm.
+    /// Interference with the other piece on the way in, mm.
     pub interference_mm: f64,
-    /// On how much of the way, mm: the last of it.
+    /// Length of the last part of the way on which it presses, mm.
     pub travel_mm: f64,
 }
 
 impl PressFit {
-    /// More than this presses nowhere on purpose, mm.
+    /// Greatest interference that counts as intended, mm.
     pub const MOST_INTERFERENCE_MM: f64 = 0.4;
 
-    /// Whether `point`, mm, is so near that it can be part of what presses.
+    /// Returns true if `point`, mm, is near enough to belong to the press fit.
     pub fn reaches(&self, point: Vec3) -> bool {
         point.distance(Vec3::from_array(self.at)) < REACH_MM
     }

@@ -1,18 +1,18 @@
-//! The pushes that a held piece must bear: what the plan estimates and the verification tries.
+//! Pushes that a held piece must resist: the plan estimates them and the verification tries them.
 
 use shellock_geom::Vec3;
 
 use crate::LatticeDirection;
 
-/// How many there are: the 26 directions of the lattice and 40 spread over the sphere.
+/// Number of pushes: the 26 directions of the lattice and 40 spread over the sphere.
 pub const N_PUSHES: usize = LatticeDirection::COUNT + N_SPHERE;
 
 const N_SPHERE: usize = 40;
 
-/// Length of a push beyond three clearances, mm: beyond all play and the roundness of printed edges.
+/// Length of a push beyond three clearances, mm: more than all play and the roundness of printed edges.
 const PUSH_MM: f64 = 0.6;
 
-/// Unit vectors: the lattice's, then points of a spiral over the sphere.
+/// Unit vectors of the pushes: the lattice's, then points of a spiral over the sphere.
 pub fn directions() -> [Vec3; N_PUSHES] {
     let spiral = (0..N_SPHERE).map(|i| {
         let i = i as f64 + 0.5;
@@ -27,7 +27,7 @@ pub fn directions() -> [Vec3; N_PUSHES] {
     std::array::from_fn(|_| all.next().expect("as many as N_PUSHES"))
 }
 
-/// Length of a push, mm, where faces are `clearance_mm` apart.
+/// Length of a push, mm, for faces that are `clearance_mm` apart.
 pub fn length_mm(clearance_mm: f64) -> f64 {
     3.0 * clearance_mm + PUSH_MM
 }

@@ -1,4 +1,4 @@
-//! In which order pieces are put together, and along which direction each: the assembly sequence.
+//! Assembly sequence: the order of installation of the pieces, and the direction of each.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,23 +7,23 @@ use crate::{Direction, PatchId};
 /// One piece of a plan and the direction along which it leaves everything installed before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InstallationStep<D = Direction> {
-    /// The piece that is put in.
+    /// Piece that is installed.
     pub piece: PatchId,
-    /// The direction along which it separates; it is installed along the opposite. Without meaning for the
+    /// Direction along which the piece separates; it is installed along the opposite one. Meaningless for the
     /// first piece.
     pub separation: D,
 }
 
-/// The order in which pieces are installed, first to last, each with its direction: any, or one of a few that
-/// a search chooses from. The last piece is the key.
+/// Order in which pieces are installed, first to last, each with its direction: an arbitrary one, or one of a
+/// few that a search chooses from. The last piece is the key.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InstallationPlan<D = Direction> {
-    /// First to last; every piece once; at least two.
+    /// Steps, first to last; every piece once; at least two.
     pub steps: Vec<InstallationStep<D>>,
 }
 
 impl<D: Copy> InstallationPlan<D> {
-    /// Pieces, first to last, each with the direction along which it separates.
+    /// Builds a plan of pieces, first to last, each with the direction along which it separates.
     pub fn new(steps: impl IntoIterator<Item = (PatchId, D)>) -> Self {
         let step = |(piece, separation)| InstallationStep { piece, separation };
         Self {
@@ -31,7 +31,7 @@ impl<D: Copy> InstallationPlan<D> {
         }
     }
 
-    /// The piece installed last, the only one that can be taken out.
+    /// Piece installed last, the only one that can be taken out.
     pub fn key(&self) -> PatchId {
         self.steps[self.steps.len() - 1].piece
     }
@@ -44,12 +44,12 @@ impl<D: Copy> InstallationPlan<D> {
             .expect("a plan names every piece once")
     }
 
-    /// The separation direction of `piece`.
+    /// Separation direction of `piece`, as planned.
     pub fn separation(&self, piece: PatchId) -> D {
         self.steps[self.position(piece)].separation
     }
 
-    /// The disassembly sequence: key first, first-installed last.
+    /// Disassembly sequence: key first, first-installed piece last.
     pub fn removal(&self) -> impl Iterator<Item = InstallationStep<D>> + '_ {
         self.steps.iter().rev().copied()
     }

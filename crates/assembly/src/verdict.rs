@@ -1,4 +1,4 @@
-//! Everything that is known of an assembly's lock, in one call.
+//! Complete verdict on an assembly's lock, in one call.
 
 use crate::certificate::{Certificate, Evidence, PieceFile, certify};
 use crate::play::{self, KitPlay, PlayParams};
@@ -7,32 +7,32 @@ use crate::verify::contact::Contact;
 use crate::verify::{Assembly, Finding, Verification, VerifyParams, examine, reaches_far_out};
 use crate::{Cancelled, Ctx};
 
-/// A verdict with what it rests on.
+/// Verdict with the data that it is based on.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Verdict {
-    /// The checks and what failed.
+    /// Checks and their findings.
     pub verification: Verification,
-    /// Where pieces touch.
+    /// Contacts between the pieces.
     pub contacts: Vec<Contact>,
-    /// How far they move; `None` where a piece is open or the plan is broken.
+    /// Play of the pieces; `None` if a piece is open or the plan is broken.
     pub play: Option<KitPlay>,
-    /// How near they come, at rest and on their ways; nothing is rim where there is no model.
+    /// Least gaps between pieces, at rest and on their ways; without a model, nothing counts as rim.
     pub gaps: KitGaps,
 }
 
-/// How much of the wall beneath the outer surface is rim, where gaps are told apart, mm.
+/// Depth beneath the outer surface up to which gaps count as those of the rim, mm.
 const RIM_MM: f64 = 1.0;
 
-/// Judges an assembly: closed pieces, no overlap, free ways in, nothing but the last piece moves, play within
-/// its limits, and no way out by hand for pieces without a proof.
+/// Verifies an assembly: pieces are closed and do not overlap, ways in are free, only the last piece moves,
+/// play is within its limits, and pieces without a proof have no way out by hand.
 ///
-/// A function of its arguments alone, on any number of threads; fails only where the user stopped. A kit of
-/// 13 pieces takes 5 s of processor time, and 2 to 4 s more for each piece whose play is not proven.
+/// A function of its arguments alone, on any number of threads; fails only if the user stopped. A kit of 13
+/// pieces takes 5 s of processor time, and 2 to 4 s more for each piece whose play is not proven.
 pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Result<Verdict, Cancelled> {
     let (mut verification, contacts) = examine(ctx, params, assembly)?;
     let is_plan = verification.checks.first().is_some_and(|check| check.ok);
-    // Barriers are those of closed surfaces.
+    // Barriers need closed surfaces.
     let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
     let is_sound = is_plan && !verification.findings.iter().any(is_open) && !reaches_far_out(assembly);
     let play = if is_sound {
@@ -49,7 +49,7 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
     })
 }
 
-/// How far pieces move, which the verdict then says.
+/// Measures the play of the pieces, and adds it to the verdict.
 fn played(
     ctx: &Ctx,
     params: &VerifyParams,
@@ -74,8 +74,8 @@ fn played(
 }
 
 impl Verdict {
-    /// What can be proven of the assembly, whose pieces are in `files`; `None` where the plan does not name
-    /// every piece once.
+    /// Certificate of everything that can be proven of the assembly, whose pieces are in `files`. `None` if
+    /// the plan does not name every piece once.
     pub fn certificate(
         &self,
         files: Vec<PieceFile>,

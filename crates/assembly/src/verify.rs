@@ -1,11 +1,11 @@
-//! Whether the finished pieces are solids, keep the model's look, go together and hold.
+//! Verification that the finished pieces are solids, keep the model's look, can be assembled, and hold.
 //!
-//! Works on the meshes as they will be written and the plan alone, and knows nothing of how they were made.
+//! Works only on the meshes as they will be written and on the plan, and knows nothing of how they were made.
 //! The limits and their reasons are in [`limits`]. A broken piece is reported and left out of the checks that
 //! need its volume.
 //!
-//! Limits: motions are infinitesimal here and contacts taken as touching; what the clearance leaves is the
-//! question of [`crate::play`]. Walls may bend in reality, and friction is ignored.
+//! Limits: motions are infinitesimal here, and contacts count as touching; [`crate::play`] accounts for the
+//! clearance. Real walls may bend, and friction is ignored.
 
 pub mod clearance;
 pub mod contact;
@@ -35,13 +35,13 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 use contact::Contact;
 pub use thin::{ThinFeature, ThinKind, ThinPoint, ThinShare, thin_places, thin_points, thin_share};
 
-/// How the finished kit is judged.
+/// Parameters for judging the finished kit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerifyParams {
     /// Gap left between mating faces, mm. [0, 1]; 0.12. Faces up to 0.15 mm farther apart still hold each
     /// other.
     pub clearance_mm: f64,
-    /// Where the sample points fall; any number.
+    /// Seed of the sample points; any number.
     pub seed: u64,
 }
 
@@ -54,14 +54,14 @@ impl Default for VerifyParams {
     }
 }
 
-/// One line of the verdict.
+/// One check of the verdict, with its figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    /// What was checked, as a statement that should hold.
+    /// Name of the check, as a statement that should hold.
     pub name: String,
-    /// Whether it holds.
+    /// True if the statement holds.
     pub ok: bool,
-    /// The measured figure, for people.
+    /// Measured figure, for people.
     pub figure: String,
 }
 
@@ -75,10 +75,10 @@ impl Check {
     }
 }
 
-/// The motion of one piece, relative to the fastest of all.
+/// Motion of one piece, relative to the fastest of all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
-    /// The piece.
+    /// Piece that performs the motion.
     pub piece: PatchId,
     /// Velocity of the piece at the origin; components in [−1, 1].
     pub velocity: [f64; 3],
@@ -96,19 +96,20 @@ impl From<&Twist> for Motion {
     }
 }
 
-/// How far a piece moves.
+/// Play of a piece: the farthest that it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Play {
     /// Greatest displacement of the centroid, mm.
     pub translation_mm: f64,
-    /// Greatest turn, degrees.
+    /// Greatest rotation of the piece, degrees.
     pub rotation_deg: f64,
-    /// Whether no path of motions of any size goes farther; else it is an estimate for small motions.
+    /// True if no path of motions of any size goes farther; otherwise the play is an estimate for small
+    /// motions.
     pub is_proven: bool,
 }
 
 impl Play {
-    /// That of a piece that nothing holds.
+    /// Play of a piece that nothing holds.
     pub const ENDLESS: Self = Self {
         translation_mm: f64::INFINITY,
         rotation_deg: f64::INFINITY,
@@ -116,109 +117,109 @@ impl Play {
     };
 }
 
-/// What is wrong, where, and with whom. Places are mm in assembly space.
+/// Defect of a kit, with its place and pieces. Places are mm in assembly space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Finding {
-    /// The plan does not name `piece` exactly once, or there is no such piece; what needs a plan was not
-    /// checked.
+    /// The plan does not name `piece` exactly once, or there is no such piece. Checks that need a plan were
+    /// skipped.
     PlanBroken {
-        /// The piece.
+        /// Piece in question, by its id.
         piece: PatchId,
     },
     /// The mesh is open, turned inside out or flat, or bounds no volume.
     NotClosed {
-        /// The piece.
+        /// Piece with this mesh.
         piece: PatchId,
     },
-    /// Edges of more than two triangles, once equal points are one.
+    /// Edges have more than two triangles, after merging equal points.
     SharedEdges {
-        /// The piece.
+        /// Piece with these edges.
         piece: PatchId,
-        /// How many edges.
+        /// Number of such edges.
         count: usize,
-        /// Middle of the first.
+        /// Midpoint of the first edge.
         at: [f64; 3],
     },
-    /// Not one connected body.
+    /// The piece is not one connected body.
     SeveralBodies {
-        /// The piece.
+        /// Piece that falls apart.
         piece: PatchId,
-        /// How many, crumbs not counted.
+        /// Number of bodies, crumbs not counted.
         count: usize,
     },
-    /// Two pieces want the same place.
+    /// Two pieces overlap in the assembly.
     Overlap {
-        /// The piece with the lower id.
+        /// Piece with the lower id.
         a: PatchId,
-        /// The other.
+        /// Piece with the higher id.
         b: PatchId,
-        /// Common volume.
+        /// Common volume of both, mm³.
         volume_mm3: f64,
-        /// Middle of the common part.
+        /// Centre of the common part.
         at: [f64; 3],
     },
-    /// Pieces leave the model.
+    /// Pieces protrude from the model.
     Outside {
-        /// Volume outside, of all pieces.
+        /// Volume outside, of all pieces, mm³.
         volume_mm3: f64,
     },
-    /// `piece` runs into `against` on its way.
+    /// The piece collides with `against` on its way.
     PathRubs {
-        /// The piece that is installed.
+        /// Piece that is installed.
         piece: PatchId,
-        /// The earlier piece that is worst in its way.
+        /// Earlier piece with the worst collision.
         against: PatchId,
-        /// How far from its place.
+        /// Distance of the piece from its place, mm.
         travel_mm: f64,
-        /// Mean thickness `2V/A` of the overlap.
+        /// Mean thickness `2V/A` of the overlap, mm.
         thickness_mm: f64,
-        /// Volume of the overlap.
+        /// Volume of the overlap, mm³.
         volume_mm3: f64,
-        /// Middle of the overlap.
+        /// Centre of the overlap.
         at: [f64; 3],
     },
-    /// A piece that is not the key leaves its place alone.
+    /// A piece other than the key can leave its place alone.
     Loose {
-        /// The piece.
+        /// Piece that is loose.
         piece: PatchId,
-        /// Unit vectors along which nothing holds it.
+        /// Unit vectors along which nothing holds the piece.
         directions: Vec<[f64; 3]>,
     },
     /// Pieces besides the key move, alone or together, by however little, while the first piece is held.
     ClusterMoves {
-        /// Who moves and how; the key is left out.
+        /// Motions of the pieces, without the key.
         motions: Vec<Motion>,
     },
-    /// A piece moves farther within the clearance than a kit may rattle.
+    /// A piece has more play within the clearance than a kit may have.
     PlayTooWide {
-        /// The piece.
+        /// Piece with this play.
         piece: PatchId,
-        /// How far.
+        /// Play of the piece.
         play: Play,
-        /// How far it may: mm and degrees.
+        /// Greatest play allowed: mm and degrees.
         most: [f64; 2],
-        /// Its centroid.
+        /// Centroid of the piece.
         at: [f64; 3],
     },
-    /// A piece that is not the key can be taken out by turning and shifting it past its connectors.
+    /// A piece other than the key can be taken out by turning and shifting it past its connectors.
     ComesOut {
-        /// The piece.
+        /// Piece that comes out.
         piece: PatchId,
-        /// Its centroid.
+        /// Centroid of the piece.
         at: [f64; 3],
     },
     /// Parts of the model's surface are on no piece.
     SurfaceLost {
-        /// Share of the surface.
+        /// Lost share of the surface.
         fraction: f64,
-        /// The point farthest from any piece.
+        /// Point farthest from any piece.
         at: [f64; 3],
     },
 }
 
 impl Finding {
-    /// Where it is, mm in assembly space, if it is at one place.
+    /// Place of the finding, mm in assembly space, if it is at one place.
     pub fn place(&self) -> Option<[f64; 3]> {
         match self {
             Self::SharedEdges { at, .. }
@@ -232,43 +233,43 @@ impl Finding {
     }
 }
 
-/// The verdict.
+/// Verdict on a kit: its checks and findings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verification {
     /// All checks, in the order they were made.
     pub checks: Vec<Check>,
-    /// What failed, in the same order.
+    /// Findings of the failed checks, in the same order.
     pub findings: Vec<Finding>,
 }
 
 impl Verification {
-    /// Whether every check holds.
+    /// Returns true if every check holds.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(|c| c.ok)
     }
 
-    /// One more check, with what it found.
+    /// Adds a check with its findings.
     pub fn add(&mut self, (check, findings): (Check, impl IntoIterator<Item = Finding>)) {
         self.checks.push(check);
         self.findings.extend(findings);
     }
 }
 
-/// A finished kit.
+/// Finished kit to be verified.
 #[derive(Clone, Copy, Debug)]
 pub struct Assembly<'a> {
-    /// What the pieces are to look like together; `None` where nothing is asked of their outside.
+    /// Model that the assembled pieces should look like; `None` if their outside does not matter.
     pub model: Option<&'a Solid>,
-    /// The pieces, as they will be written.
+    /// Pieces, as they will be written.
     pub pieces: &'a IdVec<PatchId, TriMesh>,
-    /// Their order and directions.
+    /// Order and directions of installation.
     pub plan: &'a InstallationPlan,
-    /// Where the key presses on purpose: what is shared there is no overlap.
+    /// Places where the key presses on purpose; common volume there is no overlap.
     pub press_fits: &'a [PressFit],
 }
 
 impl Assembly<'_> {
-    /// The box of the model, or of all pieces.
+    /// Bounding box of the model, or of all pieces.
     pub fn bounds(&self) -> Aabb {
         let of_pieces = || {
             self.pieces
@@ -280,13 +281,15 @@ impl Assembly<'_> {
     }
 }
 
-/// Judges the finished pieces of a model and their plan; every ending but a stop is an answer. Also the
-/// contacts of the pieces, from which a certificate is made; none where the plan is broken, or a piece reaches
-/// farther out of the model than that is large: paths, contacts and motions are not asked then.
+/// Judges the finished pieces of a model and their plan; every ending but a stop is an answer. Also returns
+/// the contacts of the pieces, from which a certificate is made.
+///
+/// There are no contacts if the plan is broken, or a piece reaches farther out of the model than the model's
+/// own size. In that case paths and motions are not checked either.
 ///
 /// A function of its arguments alone, on any number of threads. Ten pieces of 26 000 triangles take 3.5 s on
-/// two cores where every contact is doubtful, because no joint has a gap or a connector; most of it goes into
-/// the pushes.
+/// two cores if every contact is doubtful because no joint has a gap or a connector; most of it goes into the
+/// pushes.
 pub fn examine(
     ctx: &Ctx,
     params: &VerifyParams,
@@ -338,8 +341,8 @@ pub fn examine(
     Ok((verdict, contacts))
 }
 
-/// Whether a piece is of another size, or at another place, than the model: what would be asked of it next costs
-/// what it measures, and no answer would matter.
+/// Returns true if a piece is of another size, or at another place, than the model. The cost of further
+/// checks would grow with that size, and no result would matter.
 pub(crate) fn reaches_far_out(assembly: &Assembly<'_>) -> bool {
     let Some(model) = assembly.model else {
         return false;
@@ -375,11 +378,11 @@ fn check_plan(pieces: &IdVec<PatchId, TriMesh>, plan: &InstallationPlan) -> (Che
     )
 }
 
-/// Whether contacts, taken as touching, allow a motion of other pieces than the key while the first piece
-/// rests.
+/// Checks that contacts, taken as touching, allow no motion of pieces other than the key while the first
+/// piece rests.
 ///
-/// Which piece is held does not matter: of a group that moves and the rest, one lacks it. The key may move:
-/// else its own way out, seen from the key, would count as a motion of all others.
+/// The choice of the held piece does not matter: either a moving group or the rest of the pieces lacks it.
+/// The key may move; otherwise its own way out, seen from the key, would count as a motion of all others.
 fn check_motion(
     name: &str,
     plan: &InstallationPlan,
@@ -402,7 +405,8 @@ fn check_motion(
     (Check::new(name, moving.is_empty(), figure), finding)
 }
 
-/// `x` to six decimals: no printer or judge sees more, and the order in which threads add up does not show.
+/// Rounds `x` to six decimals: no printer or judge resolves more, and the order in which threads add up does
+/// not show.
 fn rounded(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }

@@ -1,4 +1,4 @@
-//! What the user should know of a job that went on.
+//! Warnings: what the user should know of a job that went on.
 
 mod words;
 
@@ -8,31 +8,31 @@ use serde::Serialize;
 
 use crate::PatchId;
 
-/// Something the user should know that did not stop the job, of all stages from the segmentation to the plates.
+/// Information for the user that did not stop the job, from any stage from the segmentation to the plates.
 ///
-/// [`fmt::Display`] is the sentence for people: what, where, what to do. It is written to files and JSON as
-/// `code`, `message`, `pieces` and `at`.
+/// [`fmt::Display`] gives the sentence for people: what is wrong, where, and what to do. A warning is written
+/// to files and JSON as `code`, `message`, `pieces` and `at`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(into = "WarningEntry")]
 pub struct Warning {
-    /// What it is about, with its figures.
+    /// Cause of the warning, with its figures.
     pub cause: Cause,
-    /// The pieces it concerns, in the order in which the sentence names them.
+    /// Pieces concerned, in the order in which the sentence names them.
     pub pieces: Vec<PatchId>,
-    /// Where, mm in assembly space.
+    /// Place of the cause, mm in assembly space.
     pub at: Option<[f64; 3]>,
 }
 
-/// How much something matters: what matters more is greater.
+/// Severity of a warning; more severe ones compare greater.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// A fact: nothing needs to be done about it.
+    /// A fact that needs no action.
     Note,
-    /// It may go wrong: something can be done, or looked at.
+    /// Something may go wrong, and can be prevented or checked.
     #[default]
     Warning,
-    /// It will go wrong if nothing is done.
+    /// Something will go wrong unless action is taken.
     Problem,
 }
 
@@ -46,28 +46,28 @@ impl fmt::Display for Severity {
     }
 }
 
-/// A warning as it stands in files.
+/// Warning in the form that files contain.
 #[derive(Clone, Debug, PartialEq, Serialize, serde::Deserialize)]
 pub struct WarningEntry {
     /// Stable name for machines, for example `"seam-without-connector"`.
     pub code: String,
-    /// How much it matters; files of former versions do not say.
+    /// Severity of the warning; files of former versions do not state it.
     #[serde(default)]
     pub severity: Severity,
-    /// The sentence.
+    /// Sentence of the warning, for people.
     pub message: String,
-    /// The pieces it concerns.
+    /// Pieces that the warning concerns.
     pub pieces: Vec<PatchId>,
-    /// Where, mm.
+    /// Place of the cause, mm.
     pub at: Option<[f64; 3]>,
 }
 
-/// What a warning is about. Lengths in mm, areas in mm², volumes in mm³, stresses in MPa.
+/// Cause of a warning. Lengths in mm, areas in mm², volumes in mm³, stresses in MPa.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the sentences in `words` say what each figure is")]
 pub enum Cause {
-    /// The model's file, in the words of the program that read it.
+    /// A remark on the model's file, in the words of the program that read it.
     Input {
         code: &'static str,
         sentence: String,
@@ -167,12 +167,12 @@ pub enum Cause {
         asked: String,
         gives_way: String,
     },
-    /// The wall is thinner than usual, as thicker ones leave connectors too little room.
+    /// The wall is thinner than usual, because a thicker one leaves too little room for connectors.
     WallThinForRoom {
         thickness_mm: f64,
         usual_mm: f64,
     },
-    // What was changed so that a kit bears more
+    // Changes that make a kit carry more load
     WallForUse {
         from_mm: f64,
         to_mm: f64,
@@ -234,7 +234,7 @@ pub enum Cause {
     },
 }
 
-/// What keeps connectors small.
+/// Limit that keeps connectors small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SizeLimit {
     /// The seam is too short.
@@ -243,12 +243,12 @@ pub enum SizeLimit {
     Cavity,
 }
 
-/// How far a piece can be moved, as far as is known.
+/// Estimated play of a piece, as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatedPlay {
-    /// Of any of its points, mm.
+    /// Greatest displacement of any point of the piece, mm.
     pub translation_mm: f64,
-    /// By how much it turns, degrees.
+    /// Greatest rotation of the piece, degrees.
     pub rotation_deg: f64,
 }
 
@@ -258,12 +258,12 @@ impl Warning {
         self.told().code
     }
 
-    /// How much it matters.
+    /// Severity of the warning, by its cause.
     pub fn severity(&self) -> Severity {
         self.told().severity
     }
 
-    /// Moved to another frame by `turn`.
+    /// Moves the warning's place to another frame by `turn`.
     pub fn turned(self, turn: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         Self {
             at: self.at.map(turn),
@@ -271,7 +271,7 @@ impl Warning {
         }
     }
 
-    /// What matters most first; what matters as much as before stays in its order.
+    /// Sorts warnings by severity, the most severe first; equal ones keep their order.
     pub fn ranked(warnings: &[Self]) -> Vec<Self> {
         let mut ranked = warnings.to_vec();
         ranked.sort_by_key(|w| std::cmp::Reverse(w.severity()));

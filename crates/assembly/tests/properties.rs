@@ -1,5 +1,5 @@
-//! What holds of directions and plans, and that a verdict is the same however an assembly lies and whatever
-//! numbers its pieces have.
+//! Properties of directions and plans, and the invariance of a verdict under the assembly's placement and the
+//! numbering of its pieces.
 
 use std::collections::BTreeSet;
 
@@ -32,17 +32,17 @@ fn judge_all(params: &VerifyParams, assembly: &Assembly<'_>) -> Verification {
     verify(&Ctx::quiet(), params, assembly).unwrap().verification
 }
 
-/// An assembly that lies somewhere and whose pieces have any numbers.
+/// Assembly at an arbitrary place, with arbitrarily numbered pieces.
 #[derive(Clone, Debug)]
 struct Placed {
     turn: LatticeTurn,
     shift: Vec3,
-    /// Number of base, lid and pin.
+    /// Numbers of base, lid and pin.
     number: Vec<usize>,
 }
 
 impl Placed {
-    /// What `judge` says of the pinned lid, placed so.
+    /// Verdict of `judge` on the pinned lid in this placement.
     fn judged(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Verification {
         let model = self.turn.mesh(&brick(ALL, ALL, ALL).to_mesh(), self.shift);
         let parts = lid
@@ -68,7 +68,7 @@ impl Placed {
         judge(&params, &assembly)
     }
 
-    /// The checks, and what was found in words that do not know how it lies.
+    /// Checks, and findings worded independently of the placement.
     fn said(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Said {
         let verdict = self.judged(lid, ways, judge);
         let checks = verdict.checks.iter().map(|c| (c.name.clone(), c.ok));
@@ -78,13 +78,13 @@ impl Placed {
         )
     }
 
-    /// Part 0, 1 or 2: base, lid or pin.
+    /// Part of the lid, 0, 1 or 2: base, lid or pin.
     fn part(&self, piece: PatchId) -> usize {
         self.number.iter().position(|&n| n == usize::from(piece)).unwrap()
     }
 
-    /// What was found, as it would be said of the assembly as it was given, without figures that come from
-    /// sampled points.
+    /// Finding as it would be worded for the original assembly, without figures that come from sampled
+    /// points.
     fn in_words(&self, finding: &Finding) -> String {
         let parts = |pieces: &[PatchId]| pieces.iter().map(|&p| self.part(p)).collect::<BTreeSet<_>>();
         match finding {
@@ -115,8 +115,8 @@ fn placed() -> impl Strategy<Value = Placed> {
     (turns(), vectors(100.0), orders(3)).prop_map(|(turn, shift, number)| Placed { turn, shift, number })
 }
 
-/// The pinned lid as it is given, with a fault or without: a pin that ends in the lid, lips that reach over
-/// nothing, a lid that leaves through the base; and the ways out.
+/// Pinned lids with a fault or without: a pin that ends in the lid, lips that reach over nothing, a lid that
+/// leaves through the base; each with the ways out.
 fn lids() -> impl Strategy<Value = (PinnedLid, [Vec3; 3])> {
     prop::sample::select(vec![0usize, 1, 2, 3]).prop_map(|fault| {
         let mut lid = PinnedLid::default();
@@ -177,7 +177,7 @@ proptest! {
         let mut dots: Vec<f64> = LatticeDirection::all().map(|d| d.unit().dot(v)).collect();
         dots.sort_by(f64::total_cmp);
         prop_assert!(nearest.unit().dot(v) >= dots[25] - 1e-12);
-        // Where two are as near, the order decides, which does not turn.
+        // In a tie the order decides, which does not turn.
         prop_assume!(dots[25] - dots[24] > 1e-9);
         prop_assert_eq!(LatticeDirection::nearest(turn.apply(v)), turned(&turn, nearest));
         prop_assert_eq!(LatticeDirection::nearest(-v), nearest.opposite());
@@ -202,7 +202,7 @@ proptest! {
     fn what_a_press_fit_reaches_goes_along_with_it(
         turn in turns(), shift in vectors(50.0), at in vectors(20.0), off in vectors(4.0),
     ) {
-        // Not where rounding decides.
+        // Exclude cases that rounding decides.
         prop_assume!((off.length() - 4.0).abs() > 1e-9);
         let fit = |at: Vec3| PressFit {
             kind: PressFitKind::Rib,

@@ -1,33 +1,33 @@
-//! How far a point rises before a closed surface stops it, while it stays within a prism.
+//! Height that a point can reach before a closed surface stops it, while the point stays within a prism.
 //!
-//! The prism is open, eight-sided and endless along a normal. From a triangle above the point one goes on
-//! over every edge that has a part in the prism, to all triangles of that edge. What is found, `S`, ends
-//! nowhere within the prism: each of its edges there has an even number of triangles of `S`, as the surface
-//! is closed. So how often, modulo 2, `S` is met above a place changes only where a path within the prism
-//! crosses `S`. A point that starts with an odd number above it and crosses no surface keeps an odd number
-//! above it, hence never comes higher than the highest place of `S` in the prism. Going on over more edges
-//! than needed does no harm.
+//! The prism is open, eight-sided and infinite along a normal. The search starts from a triangle above the
+//! point. It crosses every edge that has a part in the prism, to all triangles of that edge. The set found,
+//! `S`, ends nowhere within the prism: each of its edges there has an even number of triangles of `S`, as the
+//! surface is closed. So the number of sheets of `S` above a place, modulo 2, changes only where a path
+//! within the prism crosses `S`. A point that starts with an odd number of sheets above it and crosses no
+//! surface keeps an odd number above it. Hence the point never rises above the highest place of `S` in the
+//! prism. Crossing more edges than needed does no harm.
 
 use crate::mesh::Mesh;
 use crate::vector::{Vec3, add, cross, dot, scale, sub};
 
-/// Sides of a prism.
+/// Number of sides of a prism.
 pub const SIDES: usize = 8;
-/// Barriers that are no lower hold nothing, mm.
+/// Height from which a barrier holds nothing, mm.
 pub const MOST_RISE_MM: f64 = 1.0;
-/// More triangles are not gone through.
+/// Greatest number of triangles that a search visits.
 const MOST_TRIANGLES: usize = 400;
-/// The box around a ray is so much wider, mm: rounding.
+/// Margin of the box around a ray, mm, for rounding.
 const BESIDE_RAY_MM: f64 = 1e-6;
 
-/// A place, a normal there, and a direction across that; unit vectors.
+/// Place, normal there and direction across that; the directions are unit vectors.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
-    /// Heights are 0 there, mm.
+    /// Place where heights are 0, mm.
     pub origin: Vec3,
-    /// Heights are along it.
+    /// Direction in which heights are measured.
     pub normal: Vec3,
-    /// Perpendicular to the normal: the first side is on that side.
+    /// Direction of the first side, perpendicular to the normal.
     pub across: Vec3,
 }
 
@@ -57,9 +57,10 @@ impl Frame {
         dot(self.normal, sub(p, self.origin))
     }
 
-    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share
-    /// an edge it meets either one or none on each side: ends are compared by the same sum whichever triangle
-    /// asks, and heights are those of the ends that decided.
+    /// Height at which the line through the origin along the normal meets a triangle.
+    ///
+    /// On each side of a shared edge, the line meets one of the triangles or none. For this, ends are
+    /// compared by the same sum whichever triangle asks, and the height comes from the ends that decided.
     fn meets(&self, t: &[Vec3; 3]) -> Option<f64> {
         let flat = t.map(|p| {
             let off = sub(p, self.origin);
@@ -91,7 +92,7 @@ impl Frame {
     }
 }
 
-/// What is nearer to the line along the normal than each side.
+/// Open prism: the points nearer to the line along the normal than each side.
 #[derive(Clone, Debug)]
 pub struct Prism {
     frame: Frame,
@@ -100,7 +101,7 @@ pub struct Prism {
 }
 
 impl Prism {
-    /// Sides are `far_mm` from the line, in the order of [`Frame::sides`].
+    /// Builds a prism with sides `far_mm` from the line, in the order of [`Frame::sides`].
     pub fn new(frame: Frame, far_mm: [f64; SIDES]) -> Self {
         Self {
             frame,
@@ -109,12 +110,13 @@ impl Prism {
         }
     }
 
-    /// By how much `p` is beyond a side, mm; negative within.
+    /// Distance of `p` beyond a side, mm; negative inside.
     fn beyond(&self, side: usize, p: Vec3) -> f64 {
         dot(self.sides[side], sub(p, self.frame.origin)) - self.far_mm[side]
     }
 
-    /// Height of the highest place of a triangle within; `None` where no part of it is.
+    /// Height of the highest place of a triangle inside the prism; `None` if no part of the triangle is
+    /// inside.
     fn highest_mm(&self, t: &[Vec3; 3]) -> Option<f64> {
         let mut polygon = t.to_vec();
         for side in 0..SIDES {
@@ -137,7 +139,7 @@ impl Prism {
             .max_by(f64::total_cmp)
     }
 
-    /// Whether a part of the edge from `p` to `q` is within.
+    /// Returns true if a part of the edge from `p` to `q` is inside.
     fn has_part(&self, p: Vec3, q: Vec3) -> bool {
         let mut part = [0.0_f64, 1.0];
         for side in 0..SIDES {
@@ -153,16 +155,16 @@ impl Prism {
     }
 }
 
-/// What hangs together within a prism.
+/// Connected part of a surface within a prism.
 #[derive(Debug)]
 struct Flooded {
     highest_mm: f64,
-    /// How often the line along the normal meets it above the origin.
+    /// Number of times that the line along the normal meets the part above the origin.
     n_above: usize,
 }
 
-/// All that hangs together with triangle `first` within `prism`; an error where that is too much or not lower
-/// than `most_mm`.
+/// Collects everything connected with triangle `first` within `prism`. An error if that is too much or not
+/// lower than `most_mm`.
 fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flooded, String> {
     let mut flooded = Flooded {
         highest_mm: f64::NEG_INFINITY,
@@ -198,8 +200,8 @@ fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flood
     }
 }
 
-/// Height of the barrier that `mesh` is for a point at the prism's origin, mm: it rises no higher while it
-/// stays within.
+/// Height of the barrier that `mesh` forms above a point at the prism's origin, mm. The point cannot rise
+/// higher while it stays within the prism.
 pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
     let (from, to) = (
         prism.frame.origin,
@@ -222,7 +224,7 @@ pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
         return Err("nothing is above".into());
     };
     let [a, b, c] = mesh.triangles[first];
-    // A point within the other piece has its surface from inside above it: that stops nothing.
+    // A point inside the other piece has its surface from inside above it: that stops nothing.
     if dot(cross(sub(b, a), sub(c, a)), prism.frame.normal) >= 0.0 {
         return Err("what is above does not face the point".into());
     }
@@ -233,7 +235,7 @@ pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
     }
 }
 
-/// Whether what hangs together with triangle `first` within the prism stays lower than `most_mm`.
+/// Returns true if everything connected with triangle `first` within the prism stays lower than `most_mm`.
 pub fn stays_below(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> bool {
     flood(mesh, first, prism, most_mm).is_ok()
 }
@@ -249,7 +251,7 @@ mod tests {
         across: [1.0, 0.0, 0.0],
     };
 
-    /// As far to all sides, from a point that is `sideways` along x.
+    /// Prism with equal distances to all sides, around a point that is `sideways` along x.
     fn around(sideways: f64, far_mm: f64) -> Prism {
         Prism::new(
             Frame {
@@ -264,7 +266,7 @@ mod tests {
         found.is_ok_and(|mm| (mm - expected_mm).abs() < 1e-12)
     }
 
-    /// A closed surface below `top_mm`, with a lower side that follows points (x, z), from y −2 to y 2.
+    /// Closed surface below `top_mm`, with a lower side that follows points (x, z), from y −2 to y 2.
     fn roof(profile: &[[f64; 2]], top_mm: f64) -> Mesh {
         let mut outline = profile.to_vec();
         outline.extend(profile.iter().rev().map(|&[x, _]| [x, top_mm]));
@@ -291,8 +293,8 @@ mod tests {
         roof
     }
 
-    /// A wedge below the point: with a frame that is perpendicular to 1e-9 alone, hits and heights told by
-    /// different directions found it above.
+    /// Wedge below the point. With a frame that is perpendicular to 1e-9 only, a version that computed hits
+    /// and heights from different directions placed it above.
     #[test]
     fn a_height_is_told_by_the_ends_that_decide_the_hit() {
         let frame = Frame {
@@ -371,7 +373,7 @@ mod tests {
             "two sheets: the point passes beside"
         );
         assert!(is_near(rise_mm(&thin, &around(0.0, 0.39)), 0.3));
-        // A top whose edges are within is reached from the triangle below it.
+        // The search from the triangle below reaches a top whose edges are inside.
         let first = (0..12)
             .find(|&t| below.triangles[t].iter().all(|p| p[2] == -1.0))
             .unwrap();

@@ -1,4 +1,5 @@
-//! Places where a piece bears on another: whether they are on the piece, on a surface that is no speck.
+//! Bearings: points of a piece below another piece. Checks that they lie on the piece, on a surface wide
+//! enough to count.
 
 use serde::Deserialize;
 
@@ -7,32 +8,32 @@ use crate::mesh::Mesh;
 use crate::number;
 use crate::vector::{Vec3, dot, norm, scale, sub};
 
-/// Difference of unit vectors, and of perpendicular ones.
+/// Tolerance for unit vectors and for perpendicularity.
 const SAME: f64 = 1e-9;
-/// Beside its point the surface goes on so far to one side, mm.
+/// Width over which the surface must continue beside its point, to one side, mm.
 const BED_MM: f64 = 0.3;
-/// Where this begins, behind the point, mm: the point may be at an edge.
+/// Start of that width behind the point, mm, since the point may be at an edge.
 const BEHIND_MM: f64 = 0.01;
-/// Within that it falls away by no more than this, mm, and rounding.
+/// Greatest drop of the surface over that width, mm, and rounding.
 const BED_DROP_MM: f64 = 0.08 + 1e-6;
 
-/// A point of piece `a` that rises along the normal, towards piece `b`.
+/// Point of piece `a` that rises along the normal, towards piece `b`.
 #[derive(Clone, Deserialize)]
 pub struct Bearing {
     #[serde(deserialize_with = "crate::number::place")]
     pub a: usize,
     #[serde(deserialize_with = "crate::number::place")]
     pub b: usize,
-    /// On `a`, mm.
+    /// Point on piece `a`, mm.
     pub point: Vec3,
-    /// Unit vector, from `a` to `b`.
+    /// Unit vector from `a` to `b`.
     pub normal: Vec3,
-    /// Unit vector perpendicular to the normal: the first side of regions.
+    /// Unit vector perpendicular to the normal, towards the first side of regions.
     pub across: Vec3,
 }
 
 impl Bearing {
-    /// Where its point is and what it rises along.
+    /// Frame at the bearing's point, with the direction in which the point rises.
     pub fn frame(&self) -> Frame {
         Frame {
             origin: self.point,
@@ -41,7 +42,8 @@ impl Bearing {
         }
     }
 
-    /// With the point that is on the surface of `a`; an error where it is not there, or on a speck.
+    /// Moves the point onto the surface of `a`. An error if the point is not there, or the surface is too
+    /// small.
     fn located(&self, meshes: &[Mesh]) -> Result<Self, String> {
         let is_unit = |v: Vec3| (norm(v) - 1.0).abs() <= SAME;
         if !is_unit(self.normal) || !is_unit(self.across) || dot(self.normal, self.across).abs() > SAME {
@@ -66,7 +68,7 @@ impl Bearing {
         }
     }
 
-    /// Whether the surface around `triangle` is wide enough to one side of the point.
+    /// Returns true if the surface around `triangle` is wide enough to one side of the point.
     fn has_bed(&self, own: &Mesh, triangle: usize) -> bool {
         let down = Frame {
             normal: scale(self.normal, -1.0),
@@ -82,17 +84,17 @@ impl Bearing {
     }
 }
 
-/// The nearest unit vectors that are perpendicular but for rounding: hits and heights are told by the same
-/// frame.
+/// Nearest unit vectors that are perpendicular except for rounding. Hits and heights must be computed in the
+/// same frame.
 fn exact(normal: Vec3, across: Vec3) -> (Vec3, Vec3) {
     let unit = |v: Vec3| scale(v, 1.0 / norm(v));
     let normal = unit(unit(normal));
-    // Twice is enough.
+    // Two passes are enough.
     let square = |v: Vec3| unit(sub(v, scale(normal, dot(normal, v))));
     (normal, square(square(across)))
 }
 
-/// All with the points that are on the pieces' surfaces.
+/// Moves the points of all bearings onto the pieces' surfaces.
 pub fn located(meshes: &[Mesh], bearings: &[Bearing]) -> Result<Vec<Bearing>, String> {
     let locate = |(i, bearing): (usize, &Bearing)| {
         bearing
@@ -107,7 +109,7 @@ mod tests {
     use super::*;
     use crate::mesh::tests::cuboid;
 
-    /// At the top of a box of `width_mm`, so far from the middle.
+    /// Bearing at the top of a box of `width_mm`, offset from the middle.
     fn at_top(width_mm: f64, x: f64, y: f64, z: f64) -> Result<Vec<Bearing>, String> {
         let half = 0.5 * width_mm;
         let meshes = [

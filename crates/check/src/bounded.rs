@@ -1,10 +1,10 @@
-//! Whether multipliers show that some pieces go no farther than told, however they move.
+//! Checks that multipliers bound how far some pieces move, whatever their motions.
 //!
-//! Poses are `exp(ξ)`, `ξ = (w, v)`, of each piece that is free, with the velocity field `u(x) = v + w × x`.
-//! What is bounded is linear in the `ξ`, and so are the rows, which say how far a bearing's point rises. As
-//! long as all bounds hold, each point stays within its prism, so below its barrier, so each row is at most a
-//! number. If from the rows the multipliers give bounds that are below those told, nothing that moves on a
-//! path from rest is ever at one of these (docs/notes/certificate.md).
+//! Poses are `exp(ξ)`, `ξ = (w, v)`, of each free piece, with the velocity field `u(x) = v + w × x`. The
+//! bounded quantities are linear in the `ξ`. So are the rows, which state how far a bearing's point rises. As
+//! long as all bounds hold, each point stays within its prism, hence below its barrier, so each row is at
+//! most a known number. If the multipliers then give bounds on the quantities that are below the stated ones,
+//! no path from rest ever reaches a stated bound (docs/notes/certificate.md).
 
 use serde::Deserialize;
 
@@ -14,80 +14,81 @@ use crate::mesh::Mesh;
 use crate::quantity::Quantity;
 use crate::vector::{Vec3, cross, distance, dot, norm, scale, sub};
 
-/// Rounding of a region's side, mm. It also has room for axes that are perpendicular but for rounding.
+/// Margin of a region's side for rounding, mm. It also covers axes that are perpendicular except for
+/// rounding.
 const ROUNDING_MM: f64 = 1e-6;
-/// What the rounding of sums may add to a bound, as a share of it, and mm or rad.
+/// Margin of a bound for the rounding of sums, as a share of the bound, and in mm or rad.
 const ROUNDING: f64 = 1e-9;
-/// A key that may have slid farther is not at rest, mm.
+/// Slide up to which a key counts as at rest, mm.
 const MOST_SLIDE_MM: f64 = 0.5;
-/// Difference of two directions that are one.
+/// Greatest difference between two directions that count as equal.
 const SAME_WAY: f64 = 1e-6;
-/// Rounding of the box around the key, mm.
+/// Margin of the box around the key, mm.
 const AROUND_KEY_MM: f64 = 1e-3;
-/// Unknowns of a piece: the displacement at its place, then its turn.
+/// Number of unknowns of a piece: the displacement at its place, then its rotation.
 const UNKNOWNS: usize = 6;
 
-/// The rows that end a quantity against an axis and along it, with multipliers.
+/// Rows with multipliers that bound a quantity against an axis and along it.
 pub type Ends = [Vec<(usize, f64)>; 2];
 
-/// That free pieces go no farther than told while the others are at rest.
+/// Claim that free pieces stay within stated bounds while the others are at rest.
 #[derive(Clone, Deserialize)]
 pub struct Bounded {
-    /// In ascending order.
+    /// Free pieces, in ascending order.
     #[serde(deserialize_with = "crate::number::places")]
     pub free: Vec<usize>,
-    /// Turn and displacement of each, by their places in `quantities`.
+    /// Rotation and displacement of each free piece, as indices into `quantities`.
     pub of_piece: Vec<[usize; 2]>,
     pub quantities: Vec<Quantity>,
-    /// A bearing, the quantity that says how far it is displaced, and the one that says how far it is turned.
+    /// Rows: a bearing, the quantity of its displacement, and that of its rotation.
     pub rows: Vec<[usize; 3]>,
-    /// For each quantity and axis. The row after the last is the slide.
+    /// Multipliers for each quantity and axis. The row after the last is the slide.
     pub multipliers: Vec<Vec<Ends>>,
 }
 
-/// How far the key may have slid.
+/// Distance that the key may have slid.
 #[derive(Clone, Deserialize)]
 pub struct Slide {
     #[serde(deserialize_with = "crate::number::place")]
     pub key: usize,
-    /// The piece that it slides against.
+    /// Piece against which the slide is measured.
     #[serde(deserialize_with = "crate::number::place")]
     pub seat: usize,
-    /// The place of the key that is measured, mm.
+    /// Point of the key that is measured, mm.
     pub at: Vec3,
-    /// Its way out, a unit vector.
+    /// Way out of the key, a unit vector.
     pub along: Vec3,
     pub most_mm: f64,
 }
 
-/// What claims are tested against.
+/// Kit against which claims are tested.
 pub struct Kit<'a> {
     pub meshes: &'a [Mesh],
-    /// With points that are on the surfaces.
+    /// Bearings with points that lie on the surfaces.
     pub bearings: &'a [Bearing],
     pub slide: Option<&'a Slide>,
     pub key: usize,
-    /// The way out of the key as it is claimed elsewhere.
+    /// Way out of the key as claimed elsewhere in the certificate.
     pub way_out: Option<Vec3>,
 }
 
-/// How far one piece, or the farthest of some, goes.
+/// Play of one piece, or the greatest play of several.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Play {
     pub shift_mm: f64,
     pub turn_deg: f64,
-    /// How far the key may have slid meanwhile, where that was needed, mm.
+    /// Slide of the key that the proof assumes, if it needs one, mm.
     pub slid_mm: Option<f64>,
 }
 
-/// What a row says: this sum of unknowns is at most so much.
+/// Inequality of a row: a linear form of the unknowns is at most `most_mm`.
 struct Row {
     /// Unknowns with their factors.
     factors: Vec<(usize, f64)>,
     most_mm: f64,
 }
 
-/// How far the free pieces go, if the multipliers show that.
+/// Play of the free pieces, if the multipliers prove it.
 pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
     claim.test_form(kit.meshes.len())?;
     let n_rows = claim.rows.len();
@@ -117,7 +118,7 @@ pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
             .map(|q| claim.quantities[q[k]].norm())
             .fold(0.0, f64::max)
     };
-    // Told is how far a centroid goes, wherever displacements are bounded.
+    // The stated play is that of a centroid, wherever displacements are bounded.
     let of_centroid = |(&piece, &[turn, shift]): (&usize, &[usize; 2])| {
         let (turn, shift) = (&claim.quantities[turn], &claim.quantities[shift]);
         let off_mm = shift
@@ -140,18 +141,18 @@ pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
 }
 
 impl Bounded {
-    /// The place of a piece among the free ones.
+    /// Index of a piece among the free ones.
     fn place(&self, piece: usize) -> Option<usize> {
         self.free.binary_search(&piece).ok()
     }
 
-    /// The piece, if it is free.
+    /// Returns the piece if it is free.
     fn freed(&self, piece: usize) -> Option<usize> {
         self.place(piece).map(|_| piece)
     }
 
-    /// Everything is there and names what is there; each piece's turn and displacement are among the
-    /// quantities.
+    /// Checks that all indices are valid, and that the quantities include each piece's rotation and
+    /// displacement.
     fn test_form(&self, n_pieces: usize) -> Result<(), String> {
         let n = self.quantities.len();
         let is_ascending = self.free.windows(2).all(|pair| pair[0] < pair[1]);
@@ -183,7 +184,8 @@ impl Bounded {
         }
     }
 
-    /// Most turn of a piece, rad, and most displacement of its place `at`, mm; 0 for one at rest.
+    /// Greatest rotation of a piece, rad, and greatest displacement of its place `at`, mm; 0 for a piece at
+    /// rest.
     fn most_of(&self, piece: usize, at: Vec3) -> [f64; 2] {
         let Some(i) = self.place(piece) else {
             return [0.0; 2];
@@ -192,13 +194,13 @@ impl Bounded {
         [turn, shift + turn * distance(at, self.place_of(i))]
     }
 
-    /// The place where the displacement of a free piece is an unknown.
+    /// Place where the displacement of a free piece is an unknown.
     fn place_of(&self, i: usize) -> Vec3 {
         self.quantities[self.of_piece[i][1]].at.unwrap_or_default()
     }
 
-    /// The displacement along `d` at a place (or with none the turn about `d`) of `plus` less that of
-    /// `minus`.
+    /// Displacement of `plus` relative to `minus` along `d` at a place, as factors of the unknowns; without a
+    /// place, the rotation about `d`.
     fn factors(
         &self,
         plus: Option<usize>,
@@ -220,7 +222,7 @@ impl Bounded {
         factors
     }
 
-    /// What a bearing says: seen from its piece `b` its point goes no higher than the barrier.
+    /// Inequality of a bearing: seen from its piece `b`, its point rises no higher than the barrier.
     fn row(&self, kit: &Kit<'_>, &[bearing, cell, turn]: &[usize; 3]) -> Result<Row, String> {
         let b = kit.bearings.get(bearing).ok_or("there is no such bearing")?;
         let (freed_a, freed_b) = (self.freed(b.a), self.freed(b.b));
@@ -238,7 +240,7 @@ impl Bounded {
         let off = sub(b.point, at);
         let most_turn = turn.norm();
         let most_mm = cell.norm() + most_turn * norm(off);
-        // Where `b` is at rest, the displacement of `a` is that of the cell; where `a` is, it is 0.
+        // If `b` is at rest, the displacement of `a` is that of the cell; if `a` is, it is 0.
         let of_a_mm = if freed_b.is_none() {
             most_mm
         } else {
@@ -257,7 +259,7 @@ impl Bounded {
         })
     }
 
-    /// What the slide says of a free key.
+    /// Inequality of the slide of a free key.
     fn slide_row(&self, kit: &Kit<'_>) -> Result<Row, String> {
         let slide = kit.slide.ok_or("there is no slide to bound it")?;
         slide.test(kit)?;
@@ -281,7 +283,8 @@ impl Bounded {
         })
     }
 
-    /// Whether the rows named end a quantity along an axis (side 1) or against it (0), below its bound.
+    /// Checks that the named rows bound a quantity along an axis (side 1) or against it (0), below its stated
+    /// bound.
     fn test_bound(
         &self,
         rows: &[Row],
@@ -318,7 +321,7 @@ impl Bounded {
 }
 
 impl Slide {
-    /// Whether it is that of the key along its way out, measured at the key.
+    /// Checks that the slide is that of the key along its way out, measured at the key.
     fn test(&self, kit: &Kit<'_>) -> Result<(), String> {
         let Self {
             key,

@@ -1,4 +1,4 @@
-//! Each claim as a sentence, and whether it stands.
+//! Tests each claim, and states it as a sentence with its result.
 
 use std::thread;
 
@@ -11,21 +11,21 @@ use crate::{
     Certificate, Claim, Contact, Finding, LeastGaps, Tested, ToldPlay, gap, lock, rays, within_play,
 };
 
-/// What a play told may be below the one proven: rounding, mm and degrees.
+/// Greatest amount by which a stated play may be below the proven one: rounding, mm and degrees.
 const SAME_PLAY: f64 = 1e-6;
 
-/// What claims are tested against.
+/// Kit against which claims are tested.
 pub struct Kit<'a> {
     pub c: &'a Certificate,
     pub meshes: &'a [Mesh],
-    /// With points and normals of the surfaces, where all are there.
+    /// Contacts with points and normals of the surfaces; `None` if some are not on the surfaces.
     pub contacts: Option<&'a [Contact]>,
-    /// Likewise.
+    /// Bearings with points of the surfaces; `None` if some are not on the surfaces.
     pub bearings: Option<&'a [Bearing]>,
 }
 
 impl Kit<'_> {
-    /// All claims, in their order.
+    /// Tests all claims, in their order.
     pub fn test_claims(&self) -> Vec<Finding> {
         thread::scope(|scope| {
             let test = |claim| scope.spawn(move || self.test_claim(claim));
@@ -121,7 +121,7 @@ impl Kit<'_> {
         lock::test(&frame, contacts, held, leaves, told)
     }
 
-    /// Also whether the play that users are told of a piece is not less.
+    /// Tests the bound, and that the play stated to users for a piece is not less.
     fn test_bounded(&self, claim: &Bounded) -> (String, Tested) {
         let alone = if let [piece] = claim.free[..] {
             Some(piece)
@@ -185,7 +185,7 @@ fn is_enough(told: &ToldPlay, proven: &bounded::Play) -> bool {
     told.translation_mm >= proven.shift_mm - SAME_PLAY && told.rotation_deg >= proven.turn_deg - SAME_PLAY
 }
 
-/// "1 is", "2 and 3 are".
+/// Names of held pieces with a verb: "1 is", "2 and 3 are".
 fn are(held: &[usize]) -> String {
     let names = held
         .iter()
@@ -199,7 +199,7 @@ fn are(held: &[usize]) -> String {
     }
 }
 
-/// "piece 8", "pieces 2 and 8".
+/// Names of pieces: "piece 8", "pieces 2 and 8".
 fn named(pieces: &[usize]) -> String {
     let names = pieces
         .iter()
@@ -221,7 +221,8 @@ mod tests {
     use crate::mesh::tests::{cuboid, hollow};
     use crate::{Verdict, test_completeness, unproven};
 
-    /// Of a cube, piece 2, in a hollow, piece 1. It is the key here, though nothing lets it out.
+    /// Certificate of a cube, piece 2, in a hollow, piece 1. The cube is the key here, though it has no way
+    /// out.
     fn certificate(play: &Value) -> Value {
         let axes = json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let (mut bearings, mut multipliers) = (Vec::new(), [Vec::new(), Vec::new()]);

@@ -1,11 +1,11 @@
-//! Files of former versions as they would be written now: until certificates of version 4 and plans of version 2,
-//! pieces were numbered from 0.
+//! Conversion of files of former versions to the present form. Before version 4 of certificates and version 2
+//! of plans, pieces were numbered from 0.
 
 use serde_json::Value;
 
-/// What is read of certificates: this version as it is, the one before with other numbers.
+/// Version of certificates that is read as it is; the one before is renumbered.
 pub const CERTIFICATE: u64 = 4;
-/// What is read of plans: this version and the one before.
+/// Newest version of plans that is read; the one before is read, too.
 pub const PLAN: u64 = 2;
 
 /// Fields that hold the number of a piece.
@@ -22,10 +22,10 @@ const NUMBER: [&str; 11] = [
     "plus",
     "seat",
 ];
-/// Fields that hold a list of such.
+/// Fields that hold a list of piece numbers.
 const NUMBERS: [&str; 3] = ["free", "held", "installation_order"];
 
-/// The certificate in the form of version 4, or why it is not read.
+/// Converts a certificate to the form of version 4, or says why it is not read.
 pub fn certificate(mut certificate: Value) -> Result<Value, String> {
     let version = &certificate["version"];
     match version.as_u64() {
@@ -44,7 +44,7 @@ pub fn certificate(mut certificate: Value) -> Result<Value, String> {
     }
 }
 
-/// The plan with pieces numbered from 1, or why it is not read.
+/// Converts a plan to pieces numbered from 1, or says why it is not read.
 pub fn plan(mut plan: Value) -> Result<Value, String> {
     let version = plan["version"].as_u64().unwrap_or(1);
     if version > PLAN {
@@ -58,7 +58,7 @@ pub fn plan(mut plan: Value) -> Result<Value, String> {
     Ok(plan)
 }
 
-/// Adds 1 to all numbers of pieces.
+/// Adds 1 to all piece numbers.
 fn number_from_1(value: &mut Value) {
     match value {
         Value::Object(fields) => fields.iter_mut().for_each(|(name, value)| match value {
@@ -71,7 +71,7 @@ fn number_from_1(value: &mut Value) {
     }
 }
 
-/// Adds 1 to a number; an object has numbers of its own.
+/// Adds 1 to a number; in an object, to the piece numbers in it.
 fn add_1(value: &mut Value) {
     match value.as_u64() {
         Some(number) => *value = number.saturating_add(1).into(),

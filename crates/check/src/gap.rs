@@ -1,27 +1,28 @@
-//! Whether the least gaps that a claim tells are those of the surfaces at the places that it tells.
+//! Checks the least gaps of a claim against the surfaces at the stated places.
 //!
-//! At the place, which is midway, both surfaces are half the gap away; where they cross, other parts of them
-//! may be nearer, but not farther than half the depth. That a gap is nowhere less is not tested here; rays
-//! look for what is in the way.
+//! The place is midway, so both surfaces are half the gap away. Where they cross, other parts of them may be
+//! nearer, but not farther than half the depth. This does not test that no gap is smaller elsewhere; rays
+//! look for obstacles.
 
 use crate::mesh::Mesh;
 use crate::number;
 use crate::vector::{Vec3, scale, sub};
 use crate::{Gap, LeastGaps, PressFit, Tested};
 
-/// Difference of the gap told and the one found, mm.
+/// Greatest difference between the stated gap and the one found, mm.
 const SAME_GAP_MM: f64 = 1e-3;
-/// By how much the rim, which gaps beneath it leave out, may be nearer than these at their places, mm. 0.006
-/// on a torus.
+/// Greatest amount by which the rim may be nearer than gaps beneath it at their places, mm; these gaps leave
+/// the rim out. 0.006 on a torus.
 const RIM_NEARER_MM: f64 = 0.02;
-/// Deeper crossings are no rounding, mm.
+/// Greatest depth of a crossing that counts as rounding, mm.
 const CROSSING_MM: f64 = 0.02;
-/// A crossing at a press fit is no more than this deeper than its interference, mm.
+/// Greatest depth of a crossing at a press fit beyond its interference, mm.
 const FIT_DEEPER_MM: f64 = 0.1;
 
-/// An error where no gap is told. Confirms `figure`, with the gap beneath the rim, if the gaps are those that
-/// `least` tells: of the moving piece to one of the `others`, or of any two of these; and if surfaces cross
-/// nowhere but where the key is pressed on purpose.
+/// Confirms `figure`, with the gap beneath the rim, if the least gaps are those stated in `least`.
+///
+/// The gaps are those between the moving piece and one of the `others`, or between any two of `others`.
+/// Surfaces may cross only where the key is pressed on purpose. An error if no gap is stated.
 pub fn test(
     meshes: &[Mesh],
     press_fits: &[PressFit],
@@ -54,7 +55,7 @@ pub fn test(
     Ok(format!("{figure}; {least}"))
 }
 
-/// Whether the crossing is that of a press fit, on the piece at rest or on the one that moves.
+/// Returns true if the crossing belongs to a press fit, on the piece at rest or on the moving one.
 fn is_of(fit: &PressFit, gap: &Gap, moving: Option<(usize, Vec3)>) -> bool {
     let before = moving.map(|(_, direction)| sub(gap.at, scale(direction, gap.travel_mm)));
     let is_near = |p: Vec3| fit.is_near(p);
@@ -64,8 +65,8 @@ fn is_of(fit: &PressFit, gap: &Gap, moving: Option<(usize, Vec3)>) -> bool {
         && -gap.gap_mm <= fit.interference_mm + FIT_DEEPER_MM
 }
 
-/// Whether what pieces `a` and `b` share around `at` is a press fit's: in its place, and no deeper in either
-/// than it may be.
+/// Returns true if the overlap of pieces `a` and `b` around `at` belongs to a press fit: it is near the fit's
+/// place, and not too deep in either piece.
 pub fn is_pressed(meshes: &[Mesh], press_fits: &[PressFit], [a, b]: [usize; 2], at: Vec3) -> bool {
     press_fits
         .iter()
@@ -80,7 +81,7 @@ pub fn is_pressed(meshes: &[Mesh], press_fits: &[PressFit], [a, b]: [usize; 2], 
         })
 }
 
-/// `nearer_mm`: how much nearer surfaces may be than the gap.
+/// Checks one gap at its place. Surfaces may be nearer than the gap by `nearer_mm`.
 fn test_place(
     meshes: &[Mesh],
     moving: Option<(usize, Vec3)>,

@@ -1,8 +1,8 @@
-//! Checks the certificate of a kit of shell pieces with none of the code that made it.
+//! Checks the certificate of a kit of shell pieces without any of the code that made it.
 //!
-//! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files; nothing is
-//! believed but the choice of contacts and multipliers, and those only as far as they stand the test. What
-//! each claim means and why its test is enough: docs/notes/certificate.md.
+//! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files. Only the choice
+//! of contacts and multipliers is taken from the certificate, and each of these is tested.
+//! docs/notes/certificate.md says what each claim means and why its test suffices.
 
 mod barrier;
 mod bearing;
@@ -32,39 +32,39 @@ use claims::Kit;
 use mesh::Mesh;
 use vector::Vec3;
 
-/// What is read.
+/// Format that the program reads.
 const FORMAT: &str = "shellock-certificate";
-/// Greater clearances are no joint, mm.
+/// Greatest clearance of a joint, mm.
 const MOST_CLEARANCE_MM: f64 = 0.8;
-/// Most that a contact's faces may be apart beyond the clearance, mm.
+/// Greatest distance of a contact's faces beyond the clearance, mm.
 const MOST_REACH_MM: f64 = 0.15;
-/// More places at which a key is pressed, or pressed more than this, mm, are not a fit but a fault.
+/// Limits on the number of press fits and on their interference, mm; more is a fault, not a fit.
 const MOST_PRESS_FITS: usize = 20;
 const MOST_INTERFERENCE_MM: f64 = 0.4;
-/// What is shared or crosses at a press fit is so near to its place, mm.
+/// Greatest distance of an overlap or crossing from the place of its press fit, mm.
 const AT_FIT_MM: f64 = 4.0;
-/// Difference of two numbers written from one.
+/// Greatest difference between two numbers that were written from the same one.
 const SAME: f64 = 1e-9;
 
-/// What became of a claim.
+/// Result of testing a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It stood the test.
+    /// The claim passed its test.
     Confirmed,
-    /// It did not.
+    /// The claim failed its test.
     Refuted,
-    /// Nothing is claimed, which no kit needs.
+    /// Nothing is claimed, and no kit needs the claim.
     Unproven,
 }
 
-/// One claim and what became of it.
+/// One claim and the result of its test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// The claim, as a statement.
+    /// Claim, written as a statement.
     pub claim: String,
-    /// Whether it stood the test.
+    /// Result of the test.
     pub verdict: Verdict,
-    /// The figure that decided.
+    /// Figure that decided the result.
     pub figure: String,
 }
 
@@ -94,7 +94,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// What a test found: the figure, as good news or as bad.
+/// Result of a test: the figure, confirming or refuting.
 type Tested = Result<String, String>;
 
 #[derive(Deserialize)]
@@ -114,9 +114,9 @@ struct Certificate {
     slide: Option<Slide>,
     #[serde(default)]
     press_fits: Vec<PressFit>,
-    /// What the kit's maker found wrong with it.
+    /// Failures that the kit's maker found.
     failed: Vec<String>,
-    /// Files besides the pieces' own.
+    /// Files besides those of the pieces.
     #[serde(default)]
     files: Vec<OtherFile>,
     claims: Vec<Claim>,
@@ -128,7 +128,7 @@ struct OtherFile {
     sha256: String,
 }
 
-/// A place on a piece where the key is pressed on purpose.
+/// Place on a piece where the key is pressed on purpose.
 #[derive(Deserialize)]
 struct PressFit {
     #[serde(deserialize_with = "crate::number::place")]
@@ -138,7 +138,7 @@ struct PressFit {
 }
 
 impl PressFit {
-    /// Whether `p` is so near, mm, that a crossing there can be its own.
+    /// Returns true if `p`, mm, is near enough for a crossing there to belong to this fit.
     fn is_near(&self, p: Vec3) -> bool {
         vector::distance(p, self.at) < AT_FIT_MM
     }
@@ -153,14 +153,14 @@ struct PieceFile {
     play: Option<ToldPlay>,
 }
 
-/// How far a piece goes while the others are at rest, as users are told.
+/// Play of a piece while the others are at rest, as stated to users.
 #[derive(Deserialize)]
 struct ToldPlay {
     translation_mm: f64,
     rotation_deg: f64,
 }
 
-/// A point of piece `a`, its normal there, and the piece that it faces.
+/// Point of piece `a`, its normal there, and the piece that it faces.
 #[derive(Clone, Deserialize)]
 struct Contact {
     #[serde(deserialize_with = "crate::number::place")]
@@ -201,15 +201,15 @@ enum Claim {
     },
 }
 
-/// The least gaps of a claim, as far as they are told.
+/// Least gaps of a claim, as far as they are stated.
 #[derive(Deserialize)]
 struct LeastGaps {
     overall: Option<Gap>,
     beneath_rim: Option<Gap>,
 }
 
-/// Where two surfaces come nearest: midway between them, after the moving one has travelled. Negative is a
-/// depth.
+/// Least gap between two surfaces, and its place: midway between them, after the moving one has travelled. A
+/// negative gap is a depth.
 #[derive(Deserialize)]
 struct Gap {
     gap_mm: f64,
@@ -296,7 +296,7 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
     findings
 }
 
-/// Pieces of which it is not claimed that they stay within their play.
+/// Findings for pieces whose play is not claimed to be bounded.
 fn unproven(c: &Certificate) -> impl Iterator<Item = Finding> {
     let is_claimed = |id: usize| {
         c.claims
@@ -328,7 +328,7 @@ fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
     serde_json::from_slice(&bytes).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Key, order, directions, files and clearance are those of the plan, and all ids name pieces.
+/// Checks that key, order, directions, files and clearance match the plan, and that all ids name pieces.
 fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     let n = c.pieces.len();
     let mut order = c.installation_order.clone();
@@ -397,7 +397,7 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     }
 }
 
-/// Nothing that the maker's own tests found wrong.
+/// Checks that the maker's own tests found nothing wrong.
 fn test_passed(c: &Certificate) -> Tested {
     if c.failed.is_empty() {
         Ok("nothing failed".into())
@@ -406,11 +406,11 @@ fn test_passed(c: &Certificate) -> Tested {
     }
 }
 
-/// One lock, with the first piece held, that the key leaves; the key's way out, a way in for all others, and
-/// no overlap.
+/// Checks that all needed claims are made: one lock, with the first piece held, that only the key leaves; the
+/// key's way out, a way in for every other piece, and no overlap.
 fn test_completeness(c: &Certificate) -> Tested {
     let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
-    // Each piece: put in, bounded alone, and at rest while all others are bounded.
+    // Each piece is installed, bounded alone, and at rest while all others are bounded.
     let most = 3 + 3 * c.pieces.len();
     if c.claims.len() > most {
         return Err(format!(
@@ -444,7 +444,7 @@ fn test_completeness(c: &Certificate) -> Tested {
     Ok(format!("{} claims", c.claims.len()))
 }
 
-/// The contacts, with points and normals of the triangles that they really lie on.
+/// Contacts, with the points and normals of the triangles that they really lie on.
 fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
     if c.reach_mm > c.clearance_mm + MOST_REACH_MM + SAME {
         return Err(format!("contacts {} mm apart hold nothing", c.reach_mm));

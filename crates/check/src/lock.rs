@@ -1,46 +1,47 @@
-//! Whether contacts and their multipliers show that nothing moves but the key.
+//! Checks that contacts and their multipliers prove that nothing moves except the key.
 //!
 //! A motion gives each piece that is not held a velocity `v` and a spin `w`. A contact with normal `n` at
-//! `p`, from `a` to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`.
-//! With multipliers `μ > 0`, over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where `D = diag(min(μ,
-//! 1))` (docs/notes/certificate.md).
+//! `p`, from `a` to `b`, allows the motion if `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of
+//! `A x ≤ 0`. With multipliers `μ > 0`, over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where
+//! `D = diag(min(μ, 1))` (docs/notes/certificate.md).
 //!
-//! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. An orthonormal basis `Q` of the
-//! columns of `C` but for those that are nearly sums of others has `C = Q R + E`, where `E` is what is left
-//! of these: `‖E‖ ≤ ε`, measured. So `‖D A x‖ ≥ |(1 − Q Qᵀ) (B x_o + C x_k)| ≥ σ |x_o| − ε |x_k|`, where `σ²`
-//! is the least eigenvalue of `S = Bᵀ (1 − Q Qᵀ) B`, and the others move by at most `(|Aᵀμ| + ε) / σ` of the
-//! whole motion. The key's way out is such a nearly empty column: its walls are parallel to it but for the
-//! rounding of files. Where walls are exactly parallel, `ε` is rounding, as `|Aᵀμ|` is.
+//! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. Some columns of `C` are nearly
+//! sums of others. Let `Q` be an orthonormal basis of the remaining ones. Then `C = Q R + E`, where `E` is
+//! the residue of the nearly dependent columns: `‖E‖ ≤ ε`, measured. So
+//! `‖D A x‖ ≥ |(1 − Q Qᵀ) (B x_o + C x_k)| ≥ σ |x_o| − ε |x_k|`, where `σ²` is the least eigenvalue of
+//! `S = Bᵀ (1 − Q Qᵀ) B`, and the others move by at most `(|Aᵀμ| + ε) / σ` of the whole motion. The key's way
+//! out is such a nearly empty column: its walls are parallel to the way out except for the rounding of files.
+//! Where walls are exactly parallel, `ε` is rounding, as `|Aᵀμ|` is.
 
 use crate::vector::{Vec3, cross, scale, sub};
 use crate::{Contact, Tested};
 
-/// Share of the multipliers' sum that may be left of equilibrium: rounding.
+/// Greatest share of the multipliers' sum that may be missing from equilibrium: rounding.
 const EQUILIBRIUM: f64 = 1e-9;
-/// Share of the stated hold that must be there.
+/// Least share of the stated hold that must be found.
 const HOLD: f64 = 0.999;
-/// A column of the key that is a sum of others but for this share of all, squared, is left out.
+/// Squared share of all below which a column of the key counts as a sum of others and is left out.
 const LEFT_OUT: f64 = 1e-9;
-/// Unknowns of a piece.
+/// Number of unknowns of a piece.
 const UNKNOWNS: usize = 6;
 
-/// What twists are about.
+/// Frame of reference of twists.
 pub struct Frame {
-    /// The point they are about.
+    /// Point that twists are about.
     pub center: Vec3,
-    /// Spins count as velocities at this distance, mm.
+    /// Distance at which spins count as velocities, mm.
     pub length_mm: f64,
-    /// All pieces, held or not.
+    /// Number of all pieces, held or not.
     pub n_pieces: usize,
 }
 
-/// Whether nothing but `key` moves while `held` do not.
+/// Tests that only `key` moves while the pieces in `held` do not.
 pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, claim: &Held) -> Tested {
     let others = (0..frame.n_pieces).filter(|id| *id != key && !held.contains(id));
     let free: Vec<usize> = others.chain(Some(key).filter(|id| !held.contains(id))).collect();
     let column = |id: usize| free.iter().position(|other| *other == id).map(|i| UNKNOWNS * i);
     let n = UNKNOWNS * free.len();
-    // Weighted rows, as columns.
+    // Weighted rows of the contacts, stored by columns.
     let mut columns = vec![vec![0.0; claim.multipliers.len()]; n];
     let (mut sum, mut total) = (vec![0.0; n], 0.0);
     for (r, &(i, multiplier)) in claim.multipliers.iter().enumerate() {
@@ -80,16 +81,16 @@ pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, cla
     ))
 }
 
-/// What is told of a lock.
+/// Claimed figures of a lock.
 pub struct Held<'a> {
     /// Contacts with their forces.
     pub multipliers: &'a [(usize, f64)],
-    /// The least that a motion of the others, of length 1, does to the contacts.
+    /// Least effect that a motion of the others, of length 1, has on the contacts.
     pub hold: f64,
 }
 
-/// Takes from `columns` what lies in the space of the key's. Of these, whatever is nearly a sum of others is
-/// left out; the length of all that is left of it is told.
+/// Removes from `columns` the part in the span of the key's columns. Those of the key that are nearly sums of
+/// others are left out; returns the length of their residue.
 fn eliminate(columns: &mut [Vec<f64>], mut of_key: Vec<Vec<f64>>) -> f64 {
     let length_sq = |c: &[f64]| c.iter().map(|x| x * x).sum::<f64>();
     let least_sq = LEFT_OUT * of_key.iter().map(|c| length_sq(c)).sum::<f64>();
@@ -100,7 +101,7 @@ fn eliminate(columns: &mut [Vec<f64>], mut of_key: Vec<Vec<f64>>) -> f64 {
         let mut unit = of_key.swap_remove(pivot);
         let length = length_sq(&unit).sqrt();
         unit.iter_mut().for_each(|x| *x /= length);
-        // Twice, so that what rounding leaves the first time goes, too.
+        // Two passes, so that the rounding left by the first is removed, too.
         for column in columns.iter_mut().chain(&mut of_key) {
             for _ in 0..2 {
                 let share: f64 = column.iter().zip(&unit).map(|(x, u)| x * u).sum();
@@ -120,7 +121,7 @@ fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
-/// The columns of a row that are not 0.
+/// Non-zero columns of a contact's row.
 fn sparse_row(
     frame: &Frame,
     contact: &Contact,
@@ -136,11 +137,11 @@ fn sparse_row(
     columns.flat_map(part).collect()
 }
 
-/// Whether all eigenvalues of the symmetric `gram` are above `least²`, in spite of rounding.
+/// Returns true if all eigenvalues of the symmetric `gram` are above `least²`, in spite of rounding.
 ///
-/// By whether `gram − shift` has a Cholesky factor. Where it has one in floating point, the least eigenvalue
-/// is above `shift − (n + 1) u tr(gram)`, about [Rump2006, theorem 2.3]; the shift has room for eight times
-/// that.
+/// The test is that `gram − shift` has a Cholesky factor. If it has one in floating point, the least
+/// eigenvalue is above `shift − (n + 1) u tr(gram)`, approximately [Rump2006, theorem 2.3]; the shift leaves
+/// room for eight times that.
 fn exceeds(mut gram: Vec<f64>, n: usize, least: f64) -> bool {
     let trace: f64 = (0..n).map(|i| gram[i * n + i]).sum();
     let shift = least * least + 8.0 * (n + 2) as f64 * f64::EPSILON * trace;
@@ -173,7 +174,7 @@ mod tests {
     };
     const KEY: usize = 2;
 
-    /// Four contacts of piece `a` with `b` on the side of a cube of 10 mm around (x, 0, 0).
+    /// Four contacts of piece `a` with `b` on one side of a cube of 10 mm around (x, 0, 0).
     fn on_side(a: usize, b: usize, x: f64, axis: usize, sign: f64) -> Vec<Contact> {
         let place = |i: usize| {
             let (mut point, mut normal) = ([x, 0.0, 0.0], [0.0; 3]);
@@ -192,7 +193,7 @@ mod tests {
         (0..4).map(place).collect()
     }
 
-    /// Piece 1, a cube in a box, piece 0, whose side along x is the key, which slides along z.
+    /// Contacts of piece 1, a cube in a box, piece 0, whose side along x is the key, which slides along z.
     fn contacts() -> Vec<Contact> {
         let of_cube = [(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0), (0, -1.0)]
             .map(|(axis, sign)| on_side(1, 0, 0.0, axis, sign));
@@ -214,7 +215,7 @@ mod tests {
         )
     }
 
-    /// The greatest hold that is confirmed, but for a share of 0.001.
+    /// Greatest hold that is confirmed, to within a share of 0.001.
     fn greatest_hold(contacts: &[Contact]) -> f64 {
         let steps = (0..20_000).map(|i| f64::from(i) * 0.001).skip(1);
         steps
@@ -241,8 +242,8 @@ mod tests {
 
     #[test]
     fn a_hold_is_what_the_best_motion_of_the_key_leaves() {
-        // Along x the cube meets 4 contacts with the box and 4 with the key, which follows and meets 4 with
-        // the box.
+        // Along x the cube meets 4 contacts with the box and 4 with the key, which follows and meets 4
+        // contacts with the box.
         let all: f64 = 4.0 + 4.0 * 4.0 / (4.0 + 4.0);
         let along_x = greatest_hold(&contacts());
         assert!(along_x <= all.sqrt() / HOLD + 1e-3, "{along_x}");

@@ -1,8 +1,7 @@
-//! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim, and what
-//! that means.
+//! Command `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim,
+//! and then states the overall result.
 //!
-//! Exit code 0: everything that is claimed is confirmed; 1: something is refuted; 2: the certificate could
-//! not be read.
+//! Exit code 0: every claim is confirmed; 1: some claim is refuted; 2: the certificate could not be read.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,38 +1,38 @@
-//! A piece as the triangles of its file.
+//! Mesh of a piece, as the triangles of its file.
 
 use std::sync::OnceLock;
 
 use crate::tree::Tree;
 use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
 
-/// How far a contact's point may be from the triangle that it is said to lie on, mm: rounding of files.
+/// Greatest distance of a contact's point from the triangle that it should lie on, mm: rounding of files.
 const ON_SURFACE_MM: f64 = 1e-4;
-/// The same for the distance to the other piece.
+/// Greatest error of the distance to the other piece, mm.
 const SAME_GAP_MM: f64 = 1e-3;
 /// Least scalar product of a contact's normal with that of its triangle.
 const SAME_NORMAL: f64 = 1.0 - 1e-9;
-/// Faces whose normals have a greater scalar product do not face each other (26° from opposite).
+/// Greatest scalar product of the normals of two faces that face each other (26° from opposite).
 const FACING: f64 = -0.9;
 
-/// Nothing that is printed is so far off, mm.
+/// Greatest coordinate of a printed object, mm.
 const FARTHEST_MM: f64 = 1e5;
 
 /// Triangles, counter-clockwise seen from outside, mm.
 pub struct Mesh {
-    /// Corners of each.
+    /// Corners of each triangle.
     pub triangles: Vec<[Vec3; 3]>,
     tree: OnceLock<Tree>,
     edges: OnceLock<Edges>,
 }
 
-/// The edges of all triangles, those between the same points beside each other.
+/// Edges of all triangles, sorted so that those between the same points are adjacent.
 struct Edges {
     all: Vec<Edge>,
-    /// For side `k` of triangle `t`, at `3 t + k`: which of all lie between its ends.
+    /// Range of `all` with the same ends as side `k` of triangle `t`, at `3 t + k`.
     of_side: Vec<[usize; 2]>,
 }
 
-/// An edge of a triangle; points are one where their bytes are.
+/// Edge of a triangle. Points are equal if their bytes are.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Edge {
     ends: [[u64; 3]; 2],
@@ -42,7 +42,7 @@ struct Edge {
 }
 
 impl Mesh {
-    /// Of these triangles.
+    /// Builds a mesh of these triangles.
     pub fn new(triangles: Vec<[Vec3; 3]>) -> Self {
         Self {
             triangles,
@@ -51,7 +51,7 @@ impl Mesh {
         }
     }
 
-    /// From the bytes of a binary STL file; its normals are not read.
+    /// Reads a mesh from the bytes of a binary STL file, without its normals.
     pub fn from_stl(bytes: &[u8]) -> Result<Self, String> {
         const HEADER: usize = 84;
         const RECORD: usize = 50;
@@ -81,7 +81,7 @@ impl Mesh {
         }
     }
 
-    /// Edges that are not used equally often in both directions.
+    /// Number of edges that are not used equally often in both directions.
     pub fn n_open_edges(&self) -> usize {
         let uses = self
             .edges()
@@ -92,17 +92,17 @@ impl Mesh {
             .count()
     }
 
-    /// Triangles that share the edge of side `k` of triangle `t`: itself, and those on the other side.
+    /// Triangles that share the edge of side `k` of triangle `t`: `t` itself, and those on the other side.
     pub fn sharing(&self, t: usize, k: usize) -> impl Iterator<Item = usize> {
         let edges = self.edges();
         let [from, to] = edges.of_side[3 * t + k];
         edges.all[from..to].iter().map(|e| e.side / 3)
     }
 
-    /// Found once.
+    /// Edges of all triangles, computed once.
     fn edges(&self) -> &Edges {
         self.edges.get_or_init(|| {
-            // Zero has two signs; adding it leaves one.
+            // Zero has two signs; adding 0 leaves only one.
             let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
             let mut all = Vec::with_capacity(3 * self.triangles.len());
             for (triangle, t) in self.triangles.iter().enumerate() {
@@ -127,7 +127,7 @@ impl Mesh {
         })
     }
 
-    /// Surfaces that hang together over edges.
+    /// Number of surfaces that are connected by edges.
     pub fn n_surfaces(&self) -> usize {
         let edges = &self.edges().all;
         let mut leader: Vec<usize> = (0..self.triangles.len()).collect();
@@ -147,7 +147,7 @@ impl Mesh {
         n_surfaces
     }
 
-    /// Centre of the volume; the first corner where there is none.
+    /// Centroid of the volume; the first corner if there is no volume.
     pub fn centroid(&self) -> Vec3 {
         let origin = self.triangles.first().map_or([0.0; 3], |t| t[0]);
         let (mut moment, mut volume) = ([0.0; 3], 0.0);
@@ -164,7 +164,7 @@ impl Mesh {
         }
     }
 
-    /// Volume inside, mm³.
+    /// Volume enclosed by the mesh, mm³.
     pub fn volume_mm3(&self) -> f64 {
         self.triangles
             .iter()
@@ -172,7 +172,7 @@ impl Mesh {
             .sum()
     }
 
-    /// The triangle nearest to `point`, with the point of it that is, where that is no farther than rounding.
+    /// Triangle nearest to `point`, with its nearest point; `None` if that is farther away than rounding.
     pub fn on_surface(&self, point: Vec3) -> Option<(usize, Vec3)> {
         let near = self
             .numbers_near(point, ON_SURFACE_MM)
@@ -186,12 +186,12 @@ impl Mesh {
         })
     }
 
-    /// Triangles that may come into a box: all that do, and a few beside it.
+    /// Triangles that may enter a box: all that do, and a few beside it.
     pub fn in_box(&self, low: Vec3, high: Vec3) -> Vec<usize> {
         self.tree().near(low, high)
     }
 
-    /// Whether `point` is within `reach_mm` of the box around all triangles.
+    /// Returns true if `point` is within `reach_mm` of the bounding box of all triangles.
     pub fn is_in_bounds(&self, point: Vec3, reach_mm: f64) -> bool {
         let is_in = |[low, high]: [Vec3; 2]| {
             (0..3).all(|k| low[k] - reach_mm <= point[k] && point[k] <= high[k] + reach_mm)
@@ -199,12 +199,12 @@ impl Mesh {
         self.tree().bounds().is_some_and(is_in)
     }
 
-    /// Made once.
+    /// Search tree of the triangles, built once.
     fn tree(&self) -> &Tree {
         self.tree.get_or_init(|| Tree::new(&self.triangles))
     }
 
-    /// The point and the normal of the triangle on which `point` lies with this `normal`.
+    /// Finds the triangle with this `normal` on which `point` lies: its nearest point and its normal.
     pub fn triangle_at(&self, point: Vec3, normal: Vec3) -> Option<(Vec3, Vec3)> {
         let on = self.near(point, ON_SURFACE_MM).filter_map(|t| {
             let own = normal_of(t)?;
@@ -215,7 +215,7 @@ impl Mesh {
         on.min_by(|a, b| distance(a.0, point).total_cmp(&distance(b.0, point)))
     }
 
-    /// Whether a triangle within `gap_mm` of `point` faces `normal`.
+    /// Returns true if a triangle within `gap_mm` of `point` faces `normal`.
     pub fn is_faced(&self, point: Vec3, normal: Vec3, gap_mm: f64) -> bool {
         let reach_mm = gap_mm + SAME_GAP_MM;
         let mut near = self.near(point, reach_mm);
@@ -225,7 +225,7 @@ impl Mesh {
         })
     }
 
-    /// Distance of `point` to the surface, mm; `None` where it is more than `reach_mm`.
+    /// Distance of `point` to the surface, mm; `None` if it is more than `reach_mm`.
     pub fn distance_mm(&self, point: Vec3, reach_mm: f64) -> Option<f64> {
         let distances = self
             .near(point, reach_mm)
@@ -253,7 +253,7 @@ fn normal_of([a, b, c]: &[Vec3; 3]) -> Option<Vec3> {
     (length > 0.0).then(|| scale(normal, 1.0 / length))
 }
 
-/// The point of a triangle nearest to `p`.
+/// Point of a triangle nearest to `p`.
 fn nearest_point(t: &[Vec3; 3], p: Vec3) -> Vec3 {
     let on_edge = |k: usize| {
         let (a, b) = (t[k], t[(k + 1) % 3]);
@@ -282,14 +282,14 @@ fn nearest_point(t: &[Vec3; 3], p: Vec3) -> Vec3 {
 pub mod tests {
     use super::*;
 
-    /// A box between two corners.
+    /// Box between two corners, as a mesh.
     pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
         let (points, triangles) = shellock_testkit::plain::cuboid(min.into(), max.into());
         let corner = |i: u32| points[i as usize].to_array();
         Mesh::new(triangles.into_iter().map(|t| t.map(corner)).collect())
     }
 
-    /// A box with a hollow inside, half sides in mm, around the origin.
+    /// Box with a hollow inside, half sides in mm, around the origin.
     pub fn hollow(outside_mm: f64, inside_mm: f64) -> Mesh {
         let [mut all, inside] = [outside_mm, inside_mm].map(|h| cuboid([-h; 3], [h; 3]).triangles);
         all.extend(inside.into_iter().map(|[a, b, c]| [a, c, b]));

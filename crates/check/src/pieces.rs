@@ -1,4 +1,4 @@
-//! The files of a kit: whether they are those that were certified, and whether each piece is one body.
+//! Files of a kit: checks that they are the certified ones, and that each piece is one body.
 
 use std::fs;
 use std::path::{Component, Path};
@@ -9,10 +9,10 @@ use crate::mesh::Mesh;
 use crate::number;
 use crate::{OtherFile, PieceFile, Tested};
 
-/// Larger files are not read, bytes.
+/// Greatest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 2 << 30;
 
-/// The pieces' meshes, as far as they can be read, and whether their bytes are those that were hashed.
+/// Reads the pieces' meshes, as far as possible, and checks the hashes of their files.
 pub fn read(folder: &Path, pieces: &[PieceFile]) -> (Vec<Mesh>, Tested) {
     let (mut meshes, mut tested) = (Vec::new(), Ok(format!("{} files", pieces.len())));
     for piece in pieces {
@@ -30,7 +30,7 @@ pub fn read(folder: &Path, pieces: &[PieceFile]) -> (Vec<Mesh>, Tested) {
     (meshes, tested)
 }
 
-/// Whether other files have the bytes that were hashed.
+/// Checks that other files have the certified hashes.
 pub fn test_files(folder: &Path, files: &[OtherFile]) -> Tested {
     for other in files {
         if hash(&bytes_of(folder, &other.file)?) != other.sha256 {
@@ -44,7 +44,7 @@ pub fn test_files(folder: &Path, files: &[OtherFile]) -> Tested {
         .join(", "))
 }
 
-/// Whether every piece is one closed surface, right side out.
+/// Checks that every piece is one closed surface, right side out.
 pub fn test_closed(meshes: &[Mesh]) -> Tested {
     for (id, mesh) in meshes.iter().enumerate() {
         let (n_open, n_surfaces, volume_mm3) = (mesh.n_open_edges(), mesh.n_surfaces(), mesh.volume_mm3());
@@ -67,7 +67,7 @@ pub fn test_closed(meshes: &[Mesh]) -> Tested {
     ))
 }
 
-/// A file within the folder, whatever its name pretends.
+/// Reads a file, which must lie within the folder whatever its name says.
 fn bytes_of(folder: &Path, file: &str) -> Result<Vec<u8>, String> {
     let told = |e: std::io::Error| format!("{file}: {e}");
     let is_plain = !file.is_empty()

@@ -1,42 +1,42 @@
-//! What a claim bounds: turns and displacements of a piece, or of one against another.
+//! Bounded quantities: rotations and displacements of a piece, or of one relative to another.
 
 use serde::Deserialize;
 
 use crate::vector::{Vec3, distance, dot, norm, scale};
 
-/// Difference of directions that are unit vectors or perpendicular, and of such written in full.
+/// Tolerance for unit vectors, for perpendicularity, and for directions that are written out.
 const SAME: f64 = 1e-9;
-/// Turns of no more than this are believed, rad.
+/// Greatest rotation that is accepted, rad.
 const MOST_TURN: f64 = 0.5;
-/// Lines of the directions whose coordinates are −1, 0 or 1.
+/// Number of lines along directions with coordinates −1, 0 or 1.
 const LINES: usize = 13;
-/// No vector that goes at most 1 along each of these lines is longer: `√(1 + (√2 − 1)² + (√3 − √2)²)`,
-/// rounded up.
+/// Greatest length of a vector whose component along each of these lines is at most 1:
+/// `√(1 + (√2 − 1)² + (√3 − √2)²)`, rounded up.
 const BETWEEN_LINES: f64 = 1.1281;
 
-/// A vector that is linear in the logarithms of the poses, and how far it goes.
+/// Vector that is linear in the logarithms of the poses, with its bounds.
 #[derive(Clone, Deserialize)]
 pub struct Quantity {
-    /// The free piece that counts, and the one that counts against it; `None` for one at rest.
+    /// Free piece that counts as positive, and below the one that counts as negative; `None` for one at rest.
     #[serde(deserialize_with = "crate::number::place_if_any")]
     pub plus: Option<usize>,
     #[serde(deserialize_with = "crate::number::place_if_any")]
     pub minus: Option<usize>,
-    /// The displacement there, mm; `None` for a turn, rad.
+    /// Place of a displacement, mm; `None` for a rotation, rad.
     pub at: Option<Vec3>,
     /// Unit vectors; the first three are perpendicular.
     pub axes: Vec<Vec3>,
-    /// For each axis how far against it and along it, mm or rad, above 0.
+    /// Bounds against each axis and along it, mm or rad, above 0.
     pub most: Vec<[f64; 2]>,
 }
 
-/// Whether a unit vector is another one, either way.
+/// Returns true if two unit vectors lie along the same line.
 fn is_along(axis: Vec3, line: Vec3) -> bool {
     distance(axis, line) <= SAME || distance(axis, scale(line, -1.0)) <= SAME
 }
 
 impl Quantity {
-    /// An error where it is not one of `free` pieces, or not well formed.
+    /// Checks the form. An error if the pieces are not among `free`, or the quantity is not well formed.
     pub fn test(&self, free: &[usize]) -> Result<(), String> {
         let is_free = |id: Option<usize>| id.is_none_or(|id| free.binary_search(&id).is_ok());
         if !is_free(self.plus) || !is_free(self.minus) || self.plus == self.minus {
@@ -63,7 +63,7 @@ impl Quantity {
         Ok(())
     }
 
-    /// No vector within the bounds is longer, mm or rad.
+    /// Upper bound on the length of all vectors within the bounds, mm or rad.
     pub fn norm(&self) -> f64 {
         let longer = |[low, high]: &[f64; 2]| low.max(*high);
         let of_box = self
@@ -79,7 +79,7 @@ impl Quantity {
         of_box.min(BETWEEN_LINES * self.most.iter().map(longer).fold(0.0, f64::max))
     }
 
-    /// Whether the axes are, either way, all lines of the directions with coordinates −1, 0 or 1.
+    /// Returns true if the axes cover all lines along directions with coordinates −1, 0 or 1.
     fn covers_lines(&self) -> bool {
         let is_covered = |line: Vec3| {
             self.axes
@@ -87,12 +87,12 @@ impl Quantity {
                 .any(|axis| is_along(*axis, scale(line, 1.0 / norm(line))))
         };
         let digits = |i: usize| [i % 3, i / 3 % 3, i / 9].map(|digit| digit as f64 - 1.0);
-        // The numbers up to the middle, which is no direction, are one way along each line.
+        // The numbers below the middle one, which is no direction, give one direction along each line.
         self.axes.len() >= LINES && (0..LINES).map(digits).all(is_covered)
     }
 
-    /// The most of it along `t`, a vector of any length: with perpendicular axes, of the box around the
-    /// origin that the bounds are.
+    /// Upper bound on the component along `t`, a vector of any length. The first three axes are
+    /// perpendicular, so the bounds form a box around the origin.
     pub fn most_along(&self, t: Vec3) -> f64 {
         let part = |(axis, [low, high]): (&Vec3, &[f64; 2])| {
             let share = dot(*axis, t);
@@ -101,8 +101,8 @@ impl Quantity {
         self.axes.iter().zip(&self.most).take(3).map(part).sum()
     }
 
-    /// 1 where it counts `a` against `b`, −1 where `b` against `a`; both `None` where they are at rest.
-    /// `None` for other pieces.
+    /// Sign of the quantity: 1 if it is `a` relative to `b`, −1 if `b` relative to `a`; an argument is `None`
+    /// for a piece at rest. Returns `None` for other pieces.
     pub fn sign(&self, a: Option<usize>, b: Option<usize>) -> Option<f64> {
         match (self.plus, self.minus) {
             pair if pair == (a, b) => Some(1.0),
@@ -116,7 +116,7 @@ impl Quantity {
 pub mod tests {
     use super::*;
 
-    /// As far along each coordinate axis.
+    /// Quantity with equal bounds along each coordinate axis.
     pub fn cube(plus: Option<usize>, minus: Option<usize>, at: Option<Vec3>, most: f64) -> Quantity {
         let axes = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Quantity {

@@ -1,28 +1,28 @@
-//! Paths and overlaps by parallel rays through the pieces.
+//! Tests of paths and overlaps by parallel rays through the pieces.
 //!
-//! Along each ray a piece is a list of stretches inside it. A piece that leaves along the rays meets another
-//! one exactly where, on some ray, a stretch of the other does not lie behind its own. Rays are [`PIXEL_MM`]
-//! apart, so what is seen surely is an obstacle that covers a block of two by two rays; single rays hit the
-//! slivers that rounding leaves along walls parallel to the path, and count with their area alone.
+//! Along each ray, a piece is a list of stretches inside it. A piece that leaves along the rays hits another
+//! one exactly if, on some ray, a stretch of the other is not behind its own. Rays are [`PIXEL_MM`] apart, so
+//! an obstacle that covers a block of two by two rays is certain to be real. Single rays hit the slivers that
+//! rounding leaves along walls parallel to the path, and count with their area only.
 
 use crate::Tested;
 use crate::mesh::Mesh;
 use crate::vector::{Vec3, cross, dot, norm, scale};
 
-/// Distance of neighbouring rays, mm.
+/// Distance between neighbouring rays, mm.
 const PIXEL_MM: f64 = 0.25;
-/// Stretches that reach less far past each other are rounding, mm.
+/// Greatest overlap of two stretches that counts as rounding, mm.
 const ROUNDING_MM: f64 = 0.02;
-/// Share of a piece's shadow that single rays may find in the way.
+/// Greatest share of a piece's shadow in which single rays may find an obstacle.
 const SLIVERS: f64 = 1e-3;
-/// The same, mm², for small pieces.
+/// Area that is always allowed for single rays, mm², for small pieces.
 const SLIVERS_MM2: f64 = 1.0;
-/// More rays are not cast: 2.5 m by 2.5 m.
+/// Greatest number of rays: 2.5 m by 2.5 m.
 const MOST_RAYS: usize = 100_000_000;
-/// Rays for overlaps: parallel to no face of a common model.
+/// Direction of the rays for overlaps, parallel to no face of a common model.
 const OBLIQUE: Vec3 = [0.3713, 0.5219, 0.7680];
 
-/// Whether piece `moving` can leave along `direction` past the `others`, which stay.
+/// Tests that piece `moving` can leave along `direction` past the `others`, which stay.
 pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usize]) -> Tested {
     if (norm(direction) - 1.0).abs() > 1e-6 {
         return Err("the direction is no unit vector".into());
@@ -47,8 +47,8 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
     verdict(&grid, &is_blocked, shadow.len(), "in its way")
 }
 
-/// Whether no two pieces overlap as they are, but where they are `pressed` on purpose: two pieces, and a
-/// place that they share.
+/// Tests that no two pieces overlap at rest, except where they are `pressed` on purpose. `pressed` takes two
+/// pieces and a place that they share.
 pub fn test_apart(meshes: &[Mesh], pressed: impl Fn([usize; 2], Vec3) -> bool) -> Tested {
     let length = norm(OBLIQUE);
     let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes)?;
@@ -102,14 +102,14 @@ fn verdict(grid: &Grid, is_hit: &[bool], n_rays: usize, what: &str) -> Tested {
     }
 }
 
-/// A stretch of a ray inside a body.
+/// Stretch of a ray inside a body.
 struct Stretch {
     pixel: usize,
-    /// Depths at which the ray goes in and out, mm.
+    /// Depths at which the ray enters and leaves, mm.
     inside: [f64; 2],
 }
 
-/// Calls `visit` with each two stretches on one ray. Both lists are in order of their pixels.
+/// Calls `visit` with every two stretches on the same ray. Both lists are sorted by pixel.
 fn visit_pairs(a: &[Stretch], b: &[Stretch], mut visit: impl FnMut(usize, [f64; 2], [f64; 2])) {
     let mut from = 0;
     for s in a {
@@ -123,7 +123,7 @@ fn visit_pairs(a: &[Stretch], b: &[Stretch], mut visit: impl FnMut(usize, [f64; 
     }
 }
 
-/// Parallel rays through the middles of square pixels.
+/// Parallel rays through the centres of square pixels.
 struct Grid {
     axes: [Vec3; 3],
     origin: [f64; 2],
@@ -131,11 +131,11 @@ struct Grid {
 }
 
 impl Grid {
-    /// Covers the shadow of `meshes`; the rays run along `direction`, a unit vector. An error where that
-    /// takes too many rays.
+    /// Builds a grid that covers the shadow of `meshes`, with rays along `direction`, a unit vector. An error
+    /// if that takes too many rays.
     fn around<'a>(direction: Vec3, meshes: impl IntoIterator<Item = &'a Mesh>) -> Result<Self, String> {
-        // Rows parallel to no wall of an axis-aligned model, so that walls along the path are not met all at
-        // once.
+        // Rows are parallel to no wall of an axis-aligned model, so that a wall along the path is not hit by
+        // a whole row at once.
         let across =
             [[0.4217, -0.2873, 0.8600], [-0.7712, 0.4391, 0.4608]].map(|slant| cross(direction, slant));
         let u = if norm(across[0]) > norm(across[1]) {
@@ -175,20 +175,20 @@ impl Grid {
         }
     }
 
-    /// Place across the rays, and depth.
+    /// Coordinates across the rays, and depth.
     fn project(&self, p: Vec3) -> Vec3 {
         self.axes.map(|axis| dot(axis, p))
     }
 
-    /// The point of a ray at a depth, mm.
+    /// Point of a ray at a depth, mm.
     fn place(&self, pixel: usize, depth_mm: f64) -> Vec3 {
         let at = [pixel % self.n[0], pixel / self.n[0]].map(|k| k as f64 * PIXEL_MM);
         let along = [at[0] + self.origin[0], at[1] + self.origin[1], depth_mm];
         std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
     }
 
-    /// The stretches inside a closed mesh, also where it is inside out, since printers may fill that; in
-    /// order of their pixels, then of depth.
+    /// Stretches inside a closed mesh, sorted by pixel, then by depth. Inside-out parts count as inside,
+    /// since printers may fill them.
     fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
         let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
         mesh.triangles
@@ -214,7 +214,7 @@ impl Grid {
         stretches
     }
 
-    /// The rays that cross a triangle: its rows are cut at half-open ends that neighbours share to the last
+    /// Adds the rays that cross a triangle. Its rows have half-open ends that neighbours share to the last
     /// bit.
     fn cross_triangle(&self, t: [Vec3; 3], crossings: &mut Vec<(usize, f64, i32)>) {
         let at = |p: Vec3| {
@@ -273,8 +273,8 @@ mod tests {
     use crate::gap::is_pressed;
     use crate::mesh::tests::cuboid;
 
-    /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of what they
-    /// share.
+    /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of the
+    /// overlap.
     fn pressed_cubes(deep_mm: f64) -> Tested {
         let meshes = [
             cuboid([0.0; 3], [3.0; 3]),

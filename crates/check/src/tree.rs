@@ -1,29 +1,29 @@
-//! Triangles in order of their places, so that those near a place are found without looking at all.
+//! Tree of bounding boxes around triangles, to find those near a place without visiting all.
 
 use crate::vector::Vec3;
 
-/// A node of at most so many triangles is not divided.
+/// Greatest number of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// Boxes around triangles, the parts of each after it.
+/// Bounding boxes of triangles; each node is followed by its children.
 pub struct Tree {
     nodes: Vec<Node>,
-    /// Triangles, those of each node beside each other.
+    /// Triangle indices; those of each node are adjacent.
     order: Vec<usize>,
 }
 
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// The first node after this one and all its parts.
+    /// Index of the first node after this one and all its descendants.
     after: usize,
-    /// The part of the order that it has; empty where parts of it do.
+    /// Range of `order` in this leaf; empty for an inner node.
     from: usize,
     to: usize,
 }
 
 impl Tree {
-    /// Of all `triangles`.
+    /// Builds the tree of all `triangles`.
     pub fn new(triangles: &[[Vec3; 3]]) -> Self {
         let mut tree = Self {
             nodes: Vec::new(),
@@ -35,7 +35,7 @@ impl Tree {
         tree
     }
 
-    /// Adds the node of a part of the order, and its parts.
+    /// Adds the node for a range of the order, and its children.
     fn add(&mut self, triangles: &[[Vec3; 3]], from: usize, to: usize) {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for corner in self.order[from..to].iter().flat_map(|&t| triangles[t]) {
@@ -63,7 +63,7 @@ impl Tree {
         self.nodes[node].after = self.nodes.len();
     }
 
-    /// Triangles that may come into a box: all that do, and a few beside it.
+    /// Triangles that may enter a box: all that do, and a few beside it.
     pub fn near(&self, low: Vec3, high: Vec3) -> Vec<usize> {
         let (mut found, mut next) = (Vec::new(), 0);
         while let Some(node) = self.nodes.get(next) {
@@ -76,7 +76,7 @@ impl Tree {
         found
     }
 
-    /// The box around all triangles.
+    /// Bounding box of all triangles; `None` if there are none.
     pub fn bounds(&self) -> Option<[Vec3; 2]> {
         self.nodes.first().map(|n| [n.low, n.high])
     }

@@ -1,29 +1,29 @@
-//! Three numbers as a point or a vector.
+//! Vector arithmetic on arrays of three numbers.
 
 /// Components along x, y and z.
 pub type Vec3 = [f64; 3];
 
-/// `a + b`.
+/// Sum of two vectors, `a + b`.
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// `a − b`.
+/// Difference of two vectors, `a − b`.
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// `a` times `factor`.
+/// Product of a vector and a number, `factor · a`.
 pub fn scale(a: Vec3, factor: f64) -> Vec3 {
     a.map(|x| x * factor)
 }
 
-/// Scalar product.
+/// Scalar product of two vectors.
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Vector product.
+/// Vector product `a × b`.
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [
         a[1] * b[2] - a[2] * b[1],
@@ -32,12 +32,12 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     ]
 }
 
-/// Length.
+/// Length of a vector, ≥ 0.
 pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Distance of two points.
+/// Distance between two points.
 pub fn distance(a: Vec3, b: Vec3) -> f64 {
     norm(sub(a, b))
 }

@@ -1,4 +1,4 @@
-//! A kit as it was made is confirmed; whatever is changed in it is refuted.
+//! Tests that an unchanged kit is confirmed, and that any change to it is refuted.
 
 use std::fs;
 use std::path::Path;
@@ -24,13 +24,13 @@ fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     room([x, y, z], CLEARANCE_MM)
 }
 
-/// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin
+/// Cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin
 /// through both.
 fn parts() -> [Volume; 3] {
     parts_with_lips(4.0)
 }
 
-/// The same with lips that reach over the tongue's foot by so much.
+/// Parts as above, with lips that reach over the tongue's foot by `lip_mm`.
 fn parts_with_lips(lip_mm: f64) -> [Volume; 3] {
     let lid = PinnedLid {
         gap_mm: CLEARANCE_MM,
@@ -44,14 +44,14 @@ fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// A kit: the files of its pieces, its certificate and its plan.
+/// Kit as made: the files of its pieces, its certificate and its plan.
 struct Made {
     files: Vec<(String, Vec<u8>)>,
     certificate: Value,
     plan: Value,
 }
 
-/// The kit's certificate and plan; the files of the pieces lie in `folder` then.
+/// Writes the files of the pieces to `folder`; returns the kit's certificate and plan.
 fn made_kit(folder: &Path) -> (Value, Value) {
     static KIT: LazyLock<Made> = LazyLock::new(make);
     KIT.files
@@ -64,7 +64,7 @@ fn make() -> Made {
     made_of(&parts(), &[Vec3::X, Vec3::X, Vec3::Z])
 }
 
-/// Three parts that leave along `ways`, in the order of their numbers; the last one is the key.
+/// Kit of three parts that leave along `ways`, in the order of their numbers; the last one is the key.
 fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let pieces: IdVec<PatchId, TriMesh> = parts.iter().map(as_written).collect();
     let steps = ways.iter().copied().enumerate();
@@ -123,7 +123,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let plan = json!({ "key_piece": 3, "installation_order": [1, 2, 3], "clearance": CLEARANCE_MM,
                        "pieces": pieces.collect::<Vec<_>>() });
     let mut certificate = serde_json::to_value(certificate).unwrap();
-    // Gaps show outside, which is not of interest here.
+    // Gaps are visible from outside, which does not matter here.
     certificate["failed"] = json!([]);
     Made {
         files,
@@ -132,7 +132,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     }
 }
 
-/// The claims that are refuted once `change` has been at the kit.
+/// Claims that are refuted after `change` has been applied to the kit.
 fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let (mut certificate, mut plan) = made_kit(folder.path());
@@ -148,14 +148,14 @@ fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
         .collect()
 }
 
-/// Puts `mesh` in the place of a piece, with its hash.
+/// Replaces a piece by `mesh`, and updates its hash.
 fn replace(folder: &Path, certificate: &mut Value, piece: usize, mesh: &Volume) {
     let bytes = write_stl_binary(&as_written(mesh));
     fs::write(folder.join(format!("{piece}.stl")), &bytes).unwrap();
     certificate["pieces"][piece]["sha256"] = sha256(&bytes).into();
 }
 
-/// The multipliers of the lock with key and first piece held, and the place of the greatest.
+/// Multipliers of the lock with key and first piece held, and the index of the greatest.
 fn multipliers(certificate: &mut Value) -> (&mut Vec<Value>, usize) {
     let list = certificate["claims"][0]["multipliers"].as_array_mut().unwrap();
     let value = |i: &usize| list[*i][1].as_f64().unwrap();
@@ -184,7 +184,7 @@ fn a_changed_byte_of_a_piece_is_seen() {
     let change = |folder: &Path, _: &mut Value, _: &mut Value| {
         let path = folder.join("1.stl");
         let mut bytes = fs::read(&path).unwrap();
-        // The last bit of a coordinate.
+        // Flip the last bit of a coordinate.
         bytes[84 + 12] ^= 1;
         fs::write(path, bytes).unwrap();
     };
@@ -290,7 +290,7 @@ fn a_missing_piece_or_claim_is_missed() {
         let silent = refuted(|_, certificate, _| {
             certificate["claims"].as_array_mut().unwrap().remove(claim);
         });
-        // What is not proven of play is not claimed, and told as such.
+        // A play that is not proven is not claimed, and reported as such.
         let is_play = (1..4).contains(&claim);
         assert_eq!(
             silent.contains(&COMPLETE.to_owned()),
@@ -330,7 +330,7 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
     );
 }
 
-/// Both halves of a piece are closed, and their faces are where they were but for the cut.
+/// Both halves of a piece are closed, and their faces are unchanged except for the cut.
 #[test]
 fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
     let sawn = refuted(|folder, certificate, _| {
@@ -391,7 +391,7 @@ fn a_kit_that_failed_or_has_wide_gaps_or_files_elsewhere_is_refuted() {
     assert_eq!(other, ["other files are those that were certified"]);
 }
 
-/// A peg in a cup is the key; the lid beside them lies loose, and is the first piece.
+/// Peg in a cup as the key; the lid beside them lies loose, and is the first piece.
 #[test]
 fn a_first_piece_that_comes_off_is_not_certified() {
     let cup = brick([0.0, 20.0], [0.0, 20.0], [0.0, 20.0]);
@@ -466,8 +466,8 @@ fn what_is_no_certificate_is_an_error() {
     assert!(check(folder.path()).is_err());
 }
 
-/// The lid turned by 10° about its own axis, its bottom filed, its gaps doubled: whatever is done to it, its
-/// play is not proven any more.
+/// Lid turned by 10° about its own axis, with its bottom filed, or with doubled gaps: after each change, its
+/// play is no longer proven.
 #[test]
 fn what_is_done_to_a_piece_refutes_its_play() {
     let by = |change: &dyn Fn(&Volume) -> Volume| {
@@ -528,7 +528,7 @@ fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
     assert_eq!(told, [LID]);
 }
 
-/// What is found of the lid's play, and the names of what is refuted.
+/// Verdicts on the lid's play, and the names of the refuted claims.
 fn of_lid(made: &Made, change: impl FnOnce(&Path, &mut Value)) -> (Vec<Verdict>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     made.files
@@ -562,8 +562,8 @@ fn of_lid(made: &Made, change: impl FnOnce(&Path, &mut Value)) -> (Vec<Verdict>,
     )
 }
 
-/// As a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, a clearance of
-/// 0.1 mm off.
+/// Models a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, less a
+/// clearance of 0.1 mm.
 #[test]
 fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
     let ways = [Vec3::X, Vec3::X, Vec3::Z];
@@ -578,7 +578,7 @@ fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
         }
     });
     assert!(borrowed.1.contains(&LID.to_owned()), "{borrowed:?}");
-    // The tongue of the sound one, filed down to that.
+    // The tongue of the sound lid, filed down to that.
     let filed = of_lid(&sound, |folder, certificate| {
         replace(folder, certificate, 1, &parts_with_lips(0.2)[1])
     });

@@ -1,11 +1,11 @@
-//! The shell solver on a torus of 5 000 points: 30 000 unknowns.
+//! Benchmark of the shell solver on a torus of 5 000 points: 30 000 unknowns.
 
 use divan::{Bencher, black_box};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_mechanics::{LoadCase, Material, ShellModel};
 
 const TURN: f64 = std::f64::consts::TAU;
-/// Cells around the axis and around the tube.
+/// Number of cells around the axis and around the tube.
 const CELLS: [u32; 2] = [100, 50];
 const N_CASES: u32 = 12;
 
@@ -17,7 +17,7 @@ fn torus() -> TriMesh {
     shellock_testkit::shapes::torus(50.0, 25.0, CELLS)
 }
 
-/// A push on the lower tenth along each of [`N_CASES`] directions, held at the upper tenth.
+/// Load cases that push the lower tenth along each of [`N_CASES`] directions, held at the upper tenth.
 fn cases(mesh: &TriMesh) -> Vec<LoadCase> {
     let case = |k: u32| {
         let angle = TURN * f64::from(k) / f64::from(N_CASES);

@@ -1,10 +1,10 @@
-//! The surface metric on a ball of eight octants with 180 stations: about what a remeshed model of twelve
-//! pieces has.
+//! Benchmark of the surface metric on a ball of eight octants with 180 stations: about as many as a remeshed
+//! model of twelve pieces has.
 
 use divan::{Bencher, black_box};
 use shellock_mechanics::{Joint, Meeting, Resistance, Side, SurfaceModel, SurfaceParams, sample};
 
-/// Edges along a side of an octant.
+/// Number of edges along a side of an octant.
 const FREQUENCY: u32 = 16;
 
 fn main() {
@@ -39,7 +39,8 @@ fn model() -> SurfaceModel {
         .expect("a ball is a sound assembly")
 }
 
-/// Pieces leave along their neighbours' walls, turned by a different angle on each seam and in each plan.
+/// Plan in which pieces leave along their neighbours' walls, turned by a different angle on each seam and in
+/// each plan.
 fn plan(number: u32) -> Vec<Meeting> {
     let ball = sample::ball(60.0, FREQUENCY);
     let joint = |(i, s): (u32, &shellock_mechanics::Station)| {

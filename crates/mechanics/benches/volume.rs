@@ -1,4 +1,4 @@
-//! The volume metric on a ball of eight octants, 17 496 quadratic tetrahedra.
+//! Benchmark of the volume metric on a ball of eight octants, 17 496 quadratic tetrahedra.
 
 use divan::{Bencher, black_box};
 use shellock_mechanics::volume::Order;

@@ -1,16 +1,16 @@
-//! The volume metric against CalculiX: two plates clamped at their far edges, joined along a straight seam,
-//! pulled apart.
+//! Compares the volume metric with CalculiX on two plates clamped at their far edges, joined along a straight
+//! seam and pulled apart.
 //!
 //! `cargo run --release -p shellock-mechanics --example coupon [ANGLE]`: all rows, or those whose T is ANGLE
 //! (`-45`).
 //!
 //! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts
 //! and feet cut at each other's outlines, six-node triangles), which is swept along the seam into
-//! fifteen-node wedges; where the sides touch, each has its own nodes at the same places. A closed contact is
-//! an `*EQUATION` between two nodes; its force is what CalculiX gives as RF there, less the node's share of
-//! the load. Analyses are linear: contacts that pull are opened and those that overlap closed, until
-//! CalculiX's own results show none of either. Loads along n and ŝ are symmetric about the middle of the
-//! seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
+//! fifteen-node wedges. Where the sides touch, each has its own nodes at the same places. A closed contact is
+//! an `*EQUATION` between two nodes. Its force is CalculiX's RF there, less the node's share of the load.
+//! Analyses are linear: contacts that pull are opened and those that overlap closed, until CalculiX's own
+//! results show none of either. Loads along n and ŝ are symmetric about the middle of the seam, and half of
+//! the coupon is enough. Needs `gmsh` and `ccx`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,38 +24,39 @@ const LENGTH: f64 = 40.0;
 const WIDTH: f64 = 20.0;
 /// Connector size D, mm.
 const SIZE_MM: f64 = 3.0;
-/// Squares of our plates along and across the seam; stations are where the lines across meet it.
+/// Squares of our plates along and across the seam; stations lie where the lines across meet the seam.
 const CELLS: [u32; 2] = [20, 10];
-/// Separation force, N/mm.
+/// Separation force on the seam, N/mm.
 const FORCE: f64 = 0.1;
-/// Pull or overlap that counts as none, as a share of the largest.
+/// Greatest pull or overlap that counts as zero, as a share of the largest.
 const NONE: f64 = 1e-3;
-/// Runs of the reference after which its contacts are called unsettled.
+/// Runs of the reference after which its contacts count as not converged.
 const MAX_RUNS: usize = 12;
-/// Places closer than this are the same, mm.
+/// Distance below which places are the same, mm.
 const SAME: f64 = 1e-6;
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Displacements at the middle of the seam: side a and b, at the root and at the tip.
+/// Displacements at the middle of the seam: sides a and b, at the root and at the tip.
 type Moved = [[Vec3; 2]; 2];
 
-/// Where the reference's sides touch.
+/// Region where the reference's sides touch.
 #[derive(Clone, Copy, PartialEq)]
 enum Touch {
-    /// On the lines that our stations stand for.
+    /// On the lines that our stations represent.
     Lines,
     /// Along n on the whole common face, across the walls on their whole faces; along ŝ still at root and
     /// tip.
     Faces,
 }
 
-/// Sides of its triangles at the clamps, mm; wedges are as long as stations are apart.
+/// Edge length of its triangles at the clamps, mm. Wedges are as long as the distance between stations.
 const FAR_MM: f64 = 2.0;
-/// Sides of the reference's triangles at the seam, mm: for the comparison, and to see what the mesh does.
+/// Edge lengths of the reference's triangles at the seam, mm: one for the comparison, one to show the mesh's
+/// influence.
 const SIZES_MM: [f64; 2] = [0.7, 1.4];
 
-/// A load case: T, the normal of the walls' common face, and the force on a.
+/// Load case: T, the normal of the walls' common face, and the force on a.
 struct Case {
     frame: Frame,
     wall: Vec3,
@@ -138,7 +139,7 @@ fn main() -> Any<()> {
     Ok(())
 }
 
-/// Walls stand upright but where these would bar the way: there a plan leans them, along ŝ.
+/// Load cases. Walls stand upright, except where they would block the pull; there a plan tilts them along ŝ.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for degrees in [0.0_f64, -45.0, -90.0, 45.0] {
@@ -162,13 +163,13 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// Opening, and how far the tips of a and b move, µm.
+/// Opening, and displacements of the tips of a and b, µm.
 fn figures(m: &Moved) -> [f64; 3] {
     let widest = m[0][0].distance(m[1][0]).max(m[0][1].distance(m[1][1]));
     [widest, m[0][1].length(), m[1][1].length()].map(|mm| mm * 1e3)
 }
 
-/// The largest deviation, %. What stays closed is compared on the scale of what moves.
+/// Largest deviation, %. Contacts that stay closed are compared on the scale of the moving ones.
 fn worst(own: [f64; 3], theirs: [f64; 3]) -> f64 {
     let largest = theirs.iter().fold(0.0_f64, |m, v| m.max(*v));
     let off = |i: usize| {
@@ -186,7 +187,7 @@ fn worst(own: [f64; 3], theirs: [f64; 3]) -> f64 {
             .unwrap_or(0.0)
 }
 
-/// The cross-section's axes: x across from a to b, z outwards.
+/// Axes of the cross-section: x across from a to b, z outwards.
 struct Frame {
     degrees: f64,
     s: Vec3,
@@ -203,7 +204,7 @@ impl Frame {
         }
     }
 
-    /// `x` along n, u and ŝ, as the reference has its axes.
+    /// Components of `x` along n, u and ŝ, the axes of the reference.
     fn local(&self, x: Vec3) -> Vec3 {
         Vec3::new(x.dot(self.n), x.y, x.dot(self.s))
     }
@@ -262,7 +263,7 @@ struct Reference<'a> {
 }
 
 impl Reference<'_> {
-    /// Displacements in the reference's axes, and how many runs its contacts took to settle.
+    /// Displacements in the reference's axes, and the number of runs until its contacts settled.
     fn equilibrium(&self, folder: &Path) -> Any<(Moved, usize)> {
         std::fs::write(folder.join("section.geo"), self.geometry())?;
         run(Command::new("timeout")
@@ -286,7 +287,7 @@ impl Reference<'_> {
         let solid = Solid::swept(&section, self);
         let (contacts, probes) = (solid.contacts(&section, self), solid.probes(&section)?);
         let (model, load) = (solid.model(self), self.load_n_mm3());
-        // From open: what is closed too much opens only little by little.
+        // Start from open contacts: those closed in excess open only one by one.
         let mut is_closed: Vec<bool> = contacts.iter().map(|c| c.is_tie).collect();
         let mut fewest_wrong = usize::MAX;
         for n_runs in 1..=MAX_RUNS {
@@ -312,7 +313,7 @@ impl Reference<'_> {
                     n_runs,
                 ));
             }
-            // All that are wrong at once, until that no longer helps; then the first half.
+            // Change all wrong contacts at once until that no longer helps; then the first half.
             let n_changed = if wrong.len() < fewest_wrong {
                 wrong.len()
             } else {
@@ -327,19 +328,19 @@ impl Reference<'_> {
         Err("not settled".into())
     }
 
-    /// First and last station along the seam.
+    /// Positions of the first and last station along the seam.
     fn ends(&self) -> [f64; 2] {
         let cell = LENGTH / f64::from(CELLS[0]);
         [cell, LENGTH - cell]
     }
 
-    /// Whether what is symmetric about the middle of the seam may stand for the whole.
+    /// Returns true if one half may represent the whole, by symmetry about the middle of the seam.
     fn is_half(&self) -> bool {
         self.case.pull.y == 0.0
     }
 
-    /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two
-    /// layers, so that there are nodes at mid-wall.
+    /// Geometry of the cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin.
+    /// Walls have two layers, so that there are nodes at mid-wall.
     fn geometry(&self) -> String {
         let (d, half_wall) = (SIZE_MM, self.params.wall_mm / 2.0);
         let (h, pin) = (d / 2.0, 0.6 * d);
@@ -384,7 +385,7 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
         [pull, -pull]
     }
 
-    /// Contacts as they are, loads and what to print.
+    /// Input of a step: the contacts as they are, loads and output requests.
     fn step(&self, contacts: &[Contact], is_closed: &[bool]) -> String {
         let mut deck = String::new();
         for (contact, _) in contacts
@@ -393,7 +394,7 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
             .filter(|(_, is_closed)| **is_closed)
         {
             let ([a, b], opens) = (contact.nodes.map(|node| node + 1), contact.opens.to_array());
-            // What depends is the node's motion along the axis nearest to the contact's.
+            // The dependent unknown is the node's motion along the axis nearest to the contact's.
             let mut axes = [0, 2];
             axes.sort_by(|i, j| opens[*j].abs().total_cmp(&opens[*i].abs()));
             let of_axis = |&axis: &usize| {
@@ -421,7 +422,8 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
     }
 }
 
-/// The cross-section: places (n, 0, ŝ), six-node triangles with their sides, and where the sides touch.
+/// Cross-section: places (n, 0, ŝ), six-node triangles with their sides, and the places where the sides
+/// touch.
 struct Section {
     nodes: Vec<Vec3>,
     triangles: Vec<Triangle>,
@@ -468,8 +470,8 @@ impl Section {
         }
     }
 
-    /// Gives each side its own nodes: above the inner face they are told apart by the seam's plane, below by
-    /// the common face.
+    /// Gives each side its own nodes. Above the inner face the seam's plane separates the sides, below it the
+    /// common face does.
     fn split(at: &BTreeMap<usize, Vec3>, found: &[[usize; 6]], frame: &Frame) -> Self {
         let mut own = BTreeMap::new();
         let mut section = Self {
@@ -508,18 +510,18 @@ impl Section {
 /// Fifteen-node wedges: the cross-section swept along y.
 struct Solid {
     nodes: Vec<Vec3>,
-    /// With the side whose front they are in, if any.
+    /// Nodes of each wedge, with the side whose front it is in, if any.
     wedges: Vec<([usize; 15], Option<usize>)>,
     side: Vec<usize>,
-    /// Share of each node in the volume of its side's front.
+    /// Share of each node in the volume of its side's front, mm³.
     front_mm3: Vec<f64>,
-    /// The node at each place of the section, at each half layer.
+    /// Node at each place of the section, at each half layer.
     place: Vec<BTreeMap<usize, usize>>,
     y_of: Vec<f64>,
 }
 
-/// Two nodes at one place, of which the first may move from the second along `opens`, but not against it
-/// unless `is_tie`.
+/// Two nodes at the same place. The first may move from the second along `opens`, but not against it; if
+/// `is_tie`, neither way.
 struct Contact {
     nodes: [usize; 2],
     opens: Vec3,
@@ -556,9 +558,9 @@ impl Solid {
         solid
     }
 
-    /// The wedge on `triangle` in one layer, whose height is given where it bears the load.
+    /// Sweeps `triangle` into a wedge in one layer; the layer's height is given if the wedge carries load.
     fn sweep(&mut self, section: &Section, triangle: &Triangle, below: usize, loaded_mm: Option<f64>) {
-        // Turned round, so that the sweep goes up: n × ŝ points down the seam.
+        // Reversed, so that the sweep goes up: n × ŝ points down the seam.
         let [a, c, b, ac, cb, ba] = triangle.nodes;
         let (corners, middles) = ([a, b, c], [ba, cb, ac]);
         let mut nodes = [0; 15];
@@ -573,8 +575,8 @@ impl Solid {
         let volume = loaded_mm.unwrap_or(0.0) * (q - p).cross(r - p).length() / 2.0;
         for (i, node) in nodes.into_iter().enumerate() {
             self.side[node] = triangle.side;
-            // Integrals of the shape functions over the wedge: corners, middles of the triangles' sides,
-            // middles in between.
+            // Integrals of the shape functions over the wedge: corners, midpoints of the triangles' sides,
+            // midpoints in between.
             self.front_mm3[node] += volume * [-1.0 / 9.0, -1.0 / 9.0, 1.0 / 6.0, 1.0 / 6.0, 2.0 / 9.0][i / 3];
         }
         self.wedges.push((nodes, loaded_mm.map(|_| triangle.side)));
@@ -622,7 +624,7 @@ impl Solid {
                 let x = section.nodes[pair[0]];
                 let is_common = x.x.abs() < SAME && (-pin - SAME..SAME).contains(&x.z);
                 let is_end = is_common && (x.z.abs() < SAME || x.z < SAME - pin);
-                // Of a face's nodes, those at corners of elements bear nothing under even pressure.
+                // Under even pressure, the nodes of a face at the corners of elements carry no force.
                 let is_between = section.is_corner[pair[0]] != (half % 2 == 0);
                 let (is_tied, is_wall) = match reference.touch {
                     Touch::Lines => (is_end, x.distance(middle) < SAME),
@@ -657,7 +659,7 @@ impl Solid {
         Ok([[root[0], tip[0]], [root[1], tip[1]]])
     }
 
-    /// The input of CalculiX but for contacts and loads.
+    /// Input of CalculiX, without contacts and loads.
     fn model(&self, reference: &Reference) -> String {
         let mut deck = String::from("*NODE, NSET=NALL\n");
         for (id, p) in (1..).zip(&self.nodes) {
@@ -690,7 +692,7 @@ impl Solid {
     }
 }
 
-/// What CalculiX printed: displacements and forces by node.
+/// Results printed by CalculiX: displacements and forces by node.
 struct Results {
     moved: BTreeMap<usize, Vec3>,
     force: BTreeMap<usize, Vec3>,
@@ -740,7 +742,7 @@ impl Results {
         for (i, contact) in contacts.iter().enumerate() {
             let [a, b] = contact.nodes;
             values.push(if is_closed[i] {
-                // What the node bears but for its share of the load is the contact.
+                // The node's force, less its share of the load, is the contact force.
                 (self.force.get(&a).copied().ok_or("no force at a contact")? - body_load(a))
                     .dot(contact.opens)
             } else {

@@ -1,10 +1,11 @@
-//! A free-form shell, held at its top and pushed at its bottom: the mesh, the case and our answer as JSON.
+//! Free-form shell, held at its top and pushed at its bottom: writes the mesh, the case and our solution as
+//! JSON.
 //!
 //! `cargo run --release -p shellock-mechanics --example shell_free_form -- MODEL SIZE_MM EDGE_MM WALL_MM >
 //! case.json`
 //!
 //! MODEL is a mesh file, scaled to SIZE_MM along its longest side and remeshed to EDGE_MM.
-//! `scripts/shell_kratos.py case.json` solves the same with Kratos and compares.
+//! `scripts/shell_kratos.py case.json` solves the same case with Kratos and compares.
 
 use std::fmt::{Debug, Write as _};
 use std::io::Write as _;
@@ -16,9 +17,9 @@ use shellock_mechanics::{Displacements, LoadCase, Material, ShellModel, ShellSol
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Heights from the ends, as shares of the whole, that hold and are pushed.
+/// Height of the held and of the pushed region, as a share of the whole.
 const REGION: f64 = 0.1;
-/// Push along each axis, N.
+/// Pushing force along each axis, N.
 const PUSH: Vec3 = Vec3::new(30.0, 20.0, 100.0);
 
 fn main() -> Any<()> {

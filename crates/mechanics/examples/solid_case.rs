@@ -1,10 +1,10 @@
-//! Finished pieces, one held and one pushed, by `solid`: the case and our answers as JSON.
+//! Solves finished pieces, one held and one pushed, by `solid`: writes the case and our solutions as JSON.
 //!
 //! `cargo run --release -p shellock-mechanics --example solid_case -- CELLS HOLD PUSH PIECE… > case.json`
 //!
-//! CELLS are edges of cells in mm, 2.5,1.5. HOLD is PART,X,Y,Z,RADIUS: what of the surface of piece PART (from
-//! 0) lies in that ball is held. PUSH has a force more: PART,X,Y,Z,RADIUS,FX,FY,FZ. PIECE… are mesh files.
-//! `scripts/solid_calculix.py case.json` solves the same with CalculiX and compares.
+//! CELLS are the cell edges in mm, such as 2.5,1.5. HOLD is PART,X,Y,Z,RADIUS: the surface of piece PART
+//! (from 0) inside that ball is held. PUSH adds a force: PART,X,Y,Z,RADIUS,FX,FY,FZ. PIECE… are mesh files.
+//! `scripts/solid_calculix.py case.json` solves the same case with CalculiX and compares.
 
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Write as _};
@@ -17,14 +17,14 @@ use shellock_mechanics::solid::{Answer, Hold, Push, SolidModel, SolidParams, Spo
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Coefficients of friction.
+/// Coefficients of friction to solve for.
 const FRICTION: [f64; 2] = [0.0, 0.2];
-/// Longest edge of the triangles in whose middles the surface is looked at, mm.
+/// Longest edge of the triangles whose centroids sample the surface, mm.
 const SAMPLE_MM: f64 = 0.7;
-/// One place in each box of that edge is held, or pushed, for all of the surface there, mm.
+/// Edge of boxes, mm; one place in each box is held, or pushed, for all of the surface in it.
 const BOX_MM: f64 = 0.8;
 
-/// What is done to which pieces.
+/// Load case: files and pieces, the hold and the pushes.
 struct Case {
     files: Vec<String>,
     pieces: Vec<Solid>,
@@ -76,7 +76,7 @@ fn case(hold: &str, push: &str, files: &[String]) -> Any<Case> {
     })
 }
 
-/// Solves with cells of that edge; what touches is that of the first.
+/// Solves with cells of edge `cell_mm`; `touches` keeps the contacts of the first run.
 fn solve(case: &Case, cell_mm: f64, touches: &mut Vec<Touch>, runs: &mut Vec<String>) -> Any<()> {
     let params = SolidParams {
         cell_mm,
@@ -115,7 +115,7 @@ fn solve(case: &Case, cell_mm: f64, touches: &mut Vec<Touch>, runs: &mut Vec<Str
     Ok(())
 }
 
-/// The case as JSON that goes on.
+/// Start of the JSON text: the case itself.
 fn told(case: &Case, touches: &[Touch]) -> Any<String> {
     let Case {
         files, hold, pushes, ..
@@ -177,7 +177,7 @@ fn piece(file: &str) -> Any<Solid> {
     Solid::new(weld(&mesh).mesh).map_err(|e| format!("{file}: {e:?}").into())
 }
 
-/// The part, and places of its surface in the ball, each with its area.
+/// Finds the part, and the places of its surface in the ball, each with its area.
 fn within(pieces: &[Solid], ball: &[f64]) -> Any<(usize, Vec<(Vec3, f64)>)> {
     let [part, x, y, z, radius, ..] = ball else {
         return Err("PART,X,Y,Z,RADIUS".into());
@@ -199,7 +199,7 @@ fn within(pieces: &[Solid], ball: &[f64]) -> Any<(usize, Vec<(Vec3, f64)>)> {
     Ok((part, boxes.into_values().collect()))
 }
 
-/// Middles and areas of a triangle that is cut up until its parts are small.
+/// Calls `each` with centroids and areas of a triangle's pieces after subdivision.
 fn middles(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Vec3, f64)) {
     let [a, b, c] = mesh.corners(face);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));

@@ -21,16 +21,16 @@ pub enum Side {
     B,
 }
 
-/// Both, a first.
+/// Both sides of a station, a first.
 pub const SIDES: [Side; 2] = [Side::A, Side::B];
 
 impl Side {
-    /// 0 for a, 1 for b.
+    /// Index of the side: 0 for a, 1 for b.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// The other one.
+    /// Returns the opposite side of the station.
     pub fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -39,29 +39,30 @@ impl Side {
     }
 }
 
-/// Parts by their outer surface, triangulated coarsely enough for mechanics, and the stations of their seams.
-/// Lengths in mm.
+/// Parts, each given by its outer surface, and the stations of the seams between them. Lengths in mm.
+///
+/// The triangulation is coarse enough for mechanics.
 #[derive(Clone, Debug, Default)]
 pub struct ShellAssembly {
-    /// Points of the outer surface; each is one part's own, so where parts touch there are several at one
-    /// place.
+    /// Points of the outer surface. Each point belongs to one part, so several points share a place where
+    /// parts touch.
     pub points: Vec<Vec3>,
-    /// Outward unit normal at each point; the same for all points at one place.
+    /// Outward unit normal at each point; equal for all points at one place.
     pub normals: Vec<Vec3>,
-    /// The part of each point, in [0, `n_parts`).
+    /// Part that each point belongs to, in [0, `n_parts`).
     pub part_of_point: Vec<u32>,
-    /// Oriented outwards; the three points of a triangle are of one part.
+    /// Triangles, oriented outwards; the three points of a triangle belong to one part.
     pub triangles: Vec<[u32; 3]>,
-    /// How many parts there are.
+    /// Number of parts in the assembly.
     pub n_parts: usize,
     /// Places inside seams (not their ends) where two parts touch, in order along each seam.
     pub stations: Vec<Station>,
-    /// Pairs of stations that follow each other on a seam, by a triangle edge on either side.
+    /// Pairs of consecutive stations of a seam that are joined by a triangle edge on either side.
     pub steps: Vec<[u32; 2]>,
 }
 
 impl ShellAssembly {
-    /// A third of its triangles' area for each point, mm².
+    /// Area of each point, mm²: a third of the area of the triangles around it.
     pub fn point_areas_mm2(&self) -> Vec<f64> {
         let mut areas_mm2 = vec![0.0; self.points.len()];
         for t in &self.triangles {
@@ -78,46 +79,47 @@ impl ShellAssembly {
 pub struct Station {
     /// The point of side a and the point of side b.
     pub points: [u32; 2],
-    /// Along the seam.
+    /// Unit vector along the seam.
     pub tangent: Vec3,
-    /// Out of the surface.
+    /// Unit vector out of the surface.
     pub normal: Vec3,
-    /// In the surface, from side a to side b.
+    /// Unit vector in the surface, from side a to side b.
     pub across: Vec3,
-    /// Length of seam that the station stands for, mm.
+    /// Length of seam that the station represents, mm.
     pub length_mm: f64,
 }
 
-/// How a plan lets the two sides of one station move.
+/// Relative motions that a plan allows between the two sides of one station.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
-    /// Unit normal of the walls' common face, perpendicular to the tangent, from side a into side b: a cannot
-    /// go that way without b.
+    /// Unit normal of the walls' common face, perpendicular to the tangent, from side a into side b. Side a
+    /// cannot move that way without side b.
     pub wall: Vec3,
-    /// The connector, where there is one.
+    /// Connector at the station, if there is one.
     pub joint: Option<Joint>,
 }
 
 /// The connector that a plan makes at a station.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    /// The side with the pin.
+    /// Side of the joint with the pin.
     pub male: Side,
-    /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half
-    /// space of the outward normal, or across it; never into the surface.
+    /// Direction ŝ along which the male may leave the female: a unit vector perpendicular to the tangent.
+    /// Points outwards or across the seam, never into the surface.
     pub leaves: Vec3,
-    /// Whether friction keeps the male from leaving and from sliding, too: on the key, which nothing else
-    /// holds back.
+    /// True if friction also keeps the male from leaving and from sliding. Set on the key, which nothing else
+    /// holds.
     pub is_fast: bool,
-    /// Unit vector along which side a is pulled by the separation force; side b is pulled the other way.
+    /// Unit vector of the separation force on side a; side b is pulled the opposite way.
     pub pull_on_a: Vec3,
     /// Weight w of Eq. 4, > 0.
     pub weight: f64,
-    /// Connector size D, mm, > 0; its proportions: [`crate::connector`].
+    /// Connector size D, mm, > 0. For the proportions see [`crate::connector`].
     pub size_mm: f64,
 }
 
-/// Whether `opening_mm` lets the connector go that `meeting` has: the pin is out of its channel.
+/// Returns true if `opening_mm` pulls the pin of the meeting's connector out of its channel. NaN counts as
+/// lost.
 pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
     let lost_mm = meeting
         .joint
@@ -125,19 +127,19 @@ pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
     opening_mm.is_nan() || opening_mm >= lost_mm
 }
 
-/// What a solver found for one plan.
+/// Openings that a solver found for one plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opening {
     /// Distance between the male and the female at each station, mm; 0 where there is no joint.
     pub opening_mm: Vec<f64>,
-    /// `−max w d` over the stations (Sect. 5.1), mm; higher is better.
+    /// Rating `−max w d` over the stations (Sect. 5.1), mm; higher is better.
     pub quality_mm: f64,
-    /// The station that decides the quality.
+    /// Station with the greatest `w d`, which decides the quality.
     pub worst: Option<u32>,
 }
 
 impl Opening {
-    /// Rates the distances `opening_mm` at the stations.
+    /// Rates the openings `opening_mm` at the stations.
     pub fn rated(meetings: &[Meeting], opening_mm: Vec<f64>) -> Self {
         let rated = meetings
             .iter()
@@ -156,8 +158,8 @@ impl Opening {
         }
     }
 
-    /// Whether that holds: unless a station has let its connector go. `parts` names those of a station that
-    /// are free.
+    /// Returns [`Resistance::Separable`] if a station has lost its connector, and `Holds` otherwise. `parts`
+    /// names the free parts of a station.
     pub(crate) fn resistance<I: IntoIterator<Item = u32>>(
         self,
         meetings: &[Meeting],
@@ -175,12 +177,12 @@ impl Opening {
     }
 }
 
-/// Whether the parts hold together under the separation force.
+/// Result of pulling the parts apart with the separation force.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Resistance {
-    /// They do, and open so far.
+    /// The parts hold together, with these openings.
     Holds(Opening),
-    /// These parts (ascending) can be pulled off without any resistance, the fixed part held.
+    /// These parts (ascending) can be pulled off without resistance while the fixed part is held.
     Separable(Vec<u32>),
 }
 

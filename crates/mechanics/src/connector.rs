@@ -1,5 +1,5 @@
-//! Proportions of a connector of size D, as multiples of it: what is made, planned for and simulated is one
-//! shape.
+//! Proportions of a connector, as multiples of its size D. Planning, simulation and manufacture share this
+//! one shape.
 //!
 //! ```text
 //!       female │ male         ↑ ŝ
@@ -11,7 +11,7 @@
 //!        └──────────┘
 //! ```
 
-/// How deep the pin of the male reaches into the channel of the female. [Yao et al. 2017, Sect. 4.2, gives D
+/// Depth by which the male's pin reaches into the female's channel. [Yao et al. 2017, Sect. 4.2, gives D
 /// alone; chosen by eye]
 pub const PIN_DEPTH: f64 = 0.6;
 /// Thickness of the pin across the seam.

@@ -1,9 +1,9 @@
 //! Static mechanics of thin-walled parts that are joined along seams.
 //!
-//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Meeting`] says
-//! what a plan makes of each station. From both, the solvers compute how far the seams open under a uniform
-//! separation force or under forces from outside. This crate knows parts and stations, but neither patches
-//! nor plans.
+//! [`ShellAssembly`] describes the geometry: the parts, and the stations of the seams between them.
+//! [`Meeting`] describes how a plan joins the two sides of each station. From both, the solvers compute how
+//! far the seams open under a uniform separation force or under external loads. This crate knows parts and
+//! stations, but neither patches nor plans.
 
 pub mod assembly;
 pub mod connector;

@@ -1,4 +1,4 @@
-//! What parts are printed of.
+//! Material constants of common printing materials.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,9 +9,9 @@ pub struct Material {
     pub youngs_modulus_mpa: f64,
     /// Poisson's ratio ν. [0, 0.45].
     pub poissons_ratio: f64,
-    /// Stress that it bears, MPa.
+    /// Strength: greatest stress that the material withstands, MPa.
     pub strength_mpa: f64,
-    /// Density, g/cm³.
+    /// Density of the material, g/cm³.
     pub density_g_cm3: f64,
 }
 
@@ -45,7 +45,7 @@ impl Material {
         density_g_cm3: 1.01,
     };
 
-    /// The presets by name.
+    /// All presets with their names.
     pub const PRESETS: [(&'static str, Self); 4] = [
         ("sla-resin", Self::SLA_RESIN),
         ("pla", Self::PLA),

@@ -3,8 +3,8 @@
 //! ```text
 //!        y = across
 //!   ┌──────────▲──────────┐
-//!   │   side b │          │      held at the outer ring; the station in the middle stands for the seam, the others
-//!   ├──s──s──s─┼─s──s──s──┤ ► x  have joints as well, so that nothing ends near it
+//!   │   side b │          │      held at the outer ring; the station in the middle represents the seam;
+//!   ├──s──s──s─┼─s──s──s──┤ ► x  the others have joints as well, so that no free end is near it;
 //!   │   side a            │      z: outward normal
 //!   └─────────────────────┘
 //! ```
@@ -13,8 +13,9 @@ use shellock_geom::Vec3;
 
 use crate::assembly::{ShellAssembly, Station};
 
-/// Two rectangles of `n × rows` squares of `edge_mm` each, split into triangles, side a at y < 0. Stations at
-/// all seam points but the ends. `n` ≥ 2, `rows` ≥ 1.
+/// Builds two rectangles of `n × rows` squares of `edge_mm` each, split into triangles, with side a at y < 0.
+///
+/// There is a station at every seam point except the two ends. `n` ≥ 2, `rows` ≥ 1.
 pub fn two_plates(n: usize, rows: usize, edge_mm: f64) -> ShellAssembly {
     let mut assembly = ShellAssembly {
         n_parts: 2,
@@ -61,7 +62,7 @@ pub fn two_plates(n: usize, rows: usize, edge_mm: f64) -> ShellAssembly {
     assembly
 }
 
-/// The points of `assembly` from [`two_plates`] on its outer ring: all borders but the seam.
+/// Marks the points of [`two_plates`] on the outer ring: all borders except the seam.
 pub fn outer_ring(n: usize, rows: usize) -> Vec<bool> {
     let is_ring = |j: usize, i: usize| j == rows || i == 0 || i == n;
     (0..2)

@@ -1,32 +1,32 @@
-//! Thin shells as flat triangles with six degrees of freedom a node: displacements and stresses under several
-//! loads, for many thicknesses.
+//! Thin shells as flat triangles with six degrees of freedom a node. Computes displacements and stresses
+//! under several loads, for many thicknesses.
 //!
 //! ```text
 //!   ShellModel::new(mesh, material)      elements and pattern, once a mesh:   K = H·K_m + H³·K_b
-//!         .at_thickness(H)               a factorisation:                     no node is held for good,
-//!         .at_thickness_held(H, supports)                                     or these are
+//!         .at_thickness(H)               one factorisation:                   each case holds its own nodes,
+//!         .at_thickness_held(H, supports)                                     or these supports hold all
 //!             .solve(cases)              two triangular solves a case
 //!             .stresses(displacements)   both faces of every triangle
 //! ```
 //!
-//! **What holds.** It differs from case to case. Two ways, which answer different questions (figures in
-//! docs/notes/shell.md):
+//! **Supports.** They differ from case to case. There are two ways to hold a shell, which answer different
+//! questions (figures in docs/notes/shell.md):
 //!
-//! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean
-//!   displacement and the mean rotation of its nodes vanish. The reaction to that is a traction that varies
-//!   linearly over the region, and equilibrium alone says which: six numbers from six equations. So each
-//!   case's loads are brought into equilibrium first, the free shell is solved with the six supports of one
-//!   node, which then carry nothing, and the rigid motion is taken away last. The region itself bends under
-//!   the traction: the 99th percentile of stress was 1.5 to 2.1 times that of a clamped region. With all
-//!   nodes held so, it is inertia relief: a free body that its loads accelerate.
-//! - *Clamped*, for each set of supports a factorisation (0.2 s for 5 000 points), but no assembly and no
-//!   order of elimination. The stress at the edge of what is clamped grows with every refinement.
+//! - *In the mean*: one factorisation serves all cases. Over the area of the case's region, the mean
+//!   displacement and the mean rotation of its nodes vanish. The reaction is a traction that varies linearly
+//!   over the region. Equilibrium alone determines it: six numbers from six equations. So the loads of each
+//!   case are first brought into equilibrium. Then the free shell is solved with all six degrees of freedom
+//!   of one node held, which carry no force. Last, the rigid motion is subtracted. The region itself bends
+//!   under the traction: the 99th percentile of stress was 1.5 to 2.1 times that of a clamped region. Holding
+//!   all nodes in the mean is inertia relief: a free body accelerated by its loads.
+//! - *Clamped*: each set of supports needs a factorisation (0.2 s for 5 000 points), but no new assembly and
+//!   no new elimination order. The stress at the edge of the clamped region grows with every refinement.
 //!
-//! Each connected part of the mesh is held by its own nodes. The element is described in `element`;
+//! Each connected part of the mesh needs its own held nodes. The element is described in `element`;
 //! docs/notes/shell.md has benchmarks.
 //!
-//! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a
-//! thickness that is the same everywhere and small beside the radii of curvature, no shear across the wall.
+//! Source: Sect. 4.3 of the paper, which does not name its element. Limits: small displacements, a uniform
+//! thickness that is small compared with the radii of curvature, no shear across the wall.
 
 mod element;
 mod region;
@@ -49,15 +49,15 @@ use element::{Element, Stiffness};
 /// Degrees of freedom of a node: displacements along x, y and z, rotations about them.
 pub(crate) const DOFS: usize = 6;
 
-/// Height of a triangle over its longest edge below which it is refused as having no area.
+/// Least height of a triangle over its longest edge; flatter triangles are rejected as having no area.
 ///
-/// The entries of a stiffness grow as the inverse of this. Remeshed surfaces stay far above it.
+/// The entries of a stiffness matrix grow as the inverse of this ratio. Remeshed surfaces stay far above it.
 const MIN_HEIGHT: f64 = 1e-5;
 
-/// Thickness that can be solved for, mm.
+/// Range of thickness that can be solved for, mm.
 const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
-/// Why a shell could not be modelled or solved.
+/// Reasons why a shell could not be modelled or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShellError {
     /// Young's modulus not in (0, 10¹²], or Poisson's ratio not in [0, 0.49].
@@ -65,104 +65,104 @@ pub enum ShellError {
         "no shell is made of E = {youngs_modulus_mpa} MPa, ν = {poissons_ratio}: E must be in (0, 1e12], ν in [0, 0.49]"
     )]
     Material {
-        /// E, MPa.
+        /// Young's modulus E, MPa.
         youngs_modulus_mpa: f64,
-        /// ν.
+        /// Poisson's ratio ν, without unit.
         poissons_ratio: f64,
     },
-    /// The mesh has no triangle.
+    /// The mesh has no triangles.
     #[error("the mesh has no triangle")]
     Empty,
     /// A coordinate is not finite.
     #[error("point {0} is not finite")]
     PointNotFinite(u32),
-    /// A triangle names a point that is not there.
+    /// A triangle refers to a point that does not exist.
     #[error("triangle {0} names a point that the mesh does not have")]
     MissingPoint(u32),
-    /// A triangle is a line or a point.
+    /// A triangle degenerates to a line or a point.
     #[error("triangle {0} has no area: remesh the surface")]
     FlatTriangle(u32),
-    /// Nothing holds a point that no triangle uses.
+    /// No triangle uses a point, so nothing holds it.
     #[error("point {0} belongs to no triangle: remove unused points")]
     LoosePoint(u32),
-    /// Out of range.
+    /// The thickness is out of range.
     #[error("a thickness of {0} mm must be in [0.001, 1000]")]
     Thickness(f64),
-    /// A support or a case names a point that is not there.
+    /// A support or a load case refers to a point that does not exist.
     #[error("point {0} is held, but the mesh does not have it")]
     MissingSupport(u32),
     /// The supports let part of the shell move as a rigid body.
     #[error("the supports do not hold the part of the shell that has point {0}: hold more nodes of it")]
     Loose(u32),
-    /// A load case has another number of nodes than the mesh.
+    /// A load case has a different number of loads than the mesh has points.
     #[error("load case {case} has {have} loads for {want} points")]
     LoadLength {
-        /// Place of the case.
+        /// Index of the load case.
         case: usize,
-        /// Loads in the case.
+        /// Number of loads in the case.
         have: usize,
-        /// Points of the mesh.
+        /// Number of points in the mesh.
         want: usize,
     },
     /// A load is not finite.
     #[error("the load of point {point} in case {case} is not finite")]
     LoadNotFinite {
-        /// Place of the case.
+        /// Index of the load case.
         case: usize,
-        /// Point with the load.
+        /// Point that has the load.
         point: u32,
     },
-    /// A part of the shell has loads that do not balance and no node that holds.
+    /// A connected part has loads that do not balance and no held node.
     #[error(
         "case {case} pushes the part of the shell that has point {point}, and none of its nodes hold: hold some there"
     )]
     Unbalanced {
-        /// Place of the case.
+        /// Index of the load case.
         case: usize,
-        /// Lowest point of the part.
+        /// Lowest-numbered point of the part.
         point: u32,
     },
-    /// The nodes that hold lie on a line, so that the shell can turn about it.
+    /// The held nodes lie on a line, so the shell can turn about it.
     #[error("the nodes held in case {case} lie on a line: hold a region with an area")]
     HeldOnLine {
-        /// Place of the case.
+        /// Index of the load case.
         case: usize,
     },
-    /// A case names nodes that hold, but the solver's supports do.
+    /// A load case names held nodes although the solver already has supports.
     #[error("case {case} has its own nodes held, and so has the solver: use one or the other")]
     HeldTwice {
-        /// Place of the case.
+        /// Index of the load case.
         case: usize,
     },
-    /// The factorisation failed.
+    /// The factorisation of the stiffness failed.
     #[error(transparent)]
     Solve(#[from] SparseError),
 }
 
-/// A shell of unit thickness: what all thicknesses, supports and loads have in common.
+/// Shell of unit thickness: the data shared by all thicknesses, supports and loads.
 #[derive(Debug)]
 pub struct ShellModel {
     points: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     elements: Vec<Element>,
     elasticity: Matrix3<f64>,
-    /// The places of all stiffnesses, with values 0.
+    /// Sparsity pattern of the stiffness matrices, with values 0.
     pattern: SparseSymmetric,
     order: EliminationOrder,
-    /// Stiffness of the membrane and in bending at thickness 1 mm, at the places of `pattern`.
+    /// Membrane and bending stiffness at thickness 1 mm, at the entries of `pattern`.
     membrane: Vec<f64>,
     bending: Vec<f64>,
     /// A third of the area of the triangles around each node, mm².
     areas_mm2: Vec<f64>,
-    /// The lowest point of the connected part that each point belongs to.
+    /// Lowest-numbered point of the connected part that each point belongs to.
     part_of_point: Vec<u32>,
 }
 
 impl ShellModel {
-    /// Computes the elements, adds them up and orders the elimination; 0.2 s for 5 000 points.
+    /// Computes the elements, assembles them and orders the elimination; 0.2 s for 5 000 points.
     ///
-    /// The mesh is the middle surface; it may be open, branch, or have several parts. Corners go
-    /// counter-clockwise seen from the outer face.
+    /// The mesh is the middle surface. It may be open, branch, or have several parts. Corners are ordered
+    /// counter-clockwise as seen from the outer face.
     pub fn new(mesh: &TriMesh, material: &Material) -> Result<Self, ShellError> {
         check(mesh, material)?;
         let n_nodes = mesh.points.len();
@@ -195,13 +195,13 @@ impl ShellModel {
         })
     }
 
-    /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas
-    /// into masses.
+    /// Area of each point, mm²: a third of the area of the triangles around it. Converts pressures into
+    /// forces and areas into masses.
     pub fn areas_mm2(&self) -> &[f64] {
         &self.areas_mm2
     }
 
-    /// The points of each connected part, in ascending order.
+    /// Points of each connected part, in ascending order.
     fn parts(&self) -> Vec<Vec<u32>> {
         let mut parts = vec![Vec::new(); self.points.len()];
         for (v, &part) in (0..).zip(&self.part_of_point) {
@@ -211,13 +211,13 @@ impl ShellModel {
         parts
     }
 
-    /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load
-    /// case holds in the mean of nodes of its own.
+    /// Factorises the stiffness of the shell for `thickness_mm`, in [0.001, 1000]. Each load case is held in
+    /// the mean over its own nodes.
     pub fn at_thickness(&self, thickness_mm: f64) -> Result<ShellSolver<'_>, ShellError> {
         ShellSolver::free(self, thickness_mm)
     }
 
-    /// As [`at_thickness`](Self::at_thickness), where `supports` hold the shell in all cases.
+    /// Like [`at_thickness`](Self::at_thickness), but `supports` hold the shell in all load cases.
     pub fn at_thickness_held(
         &self,
         thickness_mm: f64,
@@ -227,7 +227,7 @@ impl ShellModel {
     }
 }
 
-/// The stiffnesses of all elements, in the membrane and in bending, added up at the places of `pattern`.
+/// Assembles the membrane and bending stiffnesses of all elements at the entries of `pattern`.
 fn assembled(
     pattern: &SparseSymmetric,
     triangles: &[[u32; 3]],
@@ -238,7 +238,7 @@ fn assembled(
     for (corners, (_, stiffnesses)) in triangles.iter().zip(elements) {
         for &[i, j] in pairs.iter().filter(|[i, j]| corners[*i] <= corners[*j]) {
             for c in 0..DOFS {
-                // Below each other in a column stand all rows of a node, down to the diagonal.
+                // A column lists all rows of a node consecutively, down to the diagonal.
                 let n_rows = if i == j { c + 1 } else { DOFS };
                 let column = corners[j] * DOFS as u32 + c as u32;
                 let Some(first) = pattern.position(corners[i] * DOFS as u32, column) else {
@@ -297,7 +297,7 @@ fn check(mesh: &TriMesh, material: &Material) -> Result<(), ShellError> {
     }
 }
 
-/// The lowest point of the connected part that each point belongs to.
+/// Lowest-numbered point of the connected part of each point.
 fn parts(n_points: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
     fn root(parent: &mut [u32], mut v: u32) -> u32 {
         while parent[v as usize] != v {

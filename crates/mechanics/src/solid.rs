@@ -1,20 +1,19 @@
-//! Finished pieces as they are printed: elastic, with gaps between them, contact and friction.
+//! Finished pieces as printed: elastic bodies with gaps between them, contact and friction.
 //!
-//! Input is closed meshes, one a piece, where they are when put together. A grid of cubes is laid over each
-//! piece on its own; a cell counts what the piece fills of it (`voxels`, `element`), and once for each part
-//! of it that hangs together (`cells`), so that neither gaps between pieces nor channels close up, however
-//! coarse the cells. Cells have quadratic displacements. Each piece's stiffness is factorised once (`body`).
-//! Pieces touch at places of their faces that face each other (`touch`), with the gap that the meshes have
-//! there, and Coulomb friction (`laws`, `equilibrium`).
+//! The input is closed meshes, one a piece, in their assembled positions. Each piece has its own grid of
+//! cubes. A cell counts the share that the piece fills (`voxels`, `element`), and is duplicated for each
+//! connected part of the piece in it (`cells`). So neither gaps between pieces nor channels close up, however
+//! coarse the cells are. Cells have quadratic displacements. Each piece's stiffness is factorised once
+//! (`body`). Pieces can touch where their faces meet (`touch`), with the gap that the meshes have there, and
+//! with Coulomb friction (`laws`, `equilibrium`).
 //!
-//! A load is applied twice. A hundredth of it takes up the play: pieces go until they touch
-//! ([`Moved::settled_mm`]), with friction that counts slip from rest. Then all of it, with friction that
-//! counts slip from there.
+//! A load is applied in two steps. First, a hundredth of it takes up the play: pieces move until they touch
+//! ([`Moved::settled_mm`]), with friction that counts slip from rest. Then the full load is applied, with
+//! friction that counts slip from that state.
 //!
-//! Sources: finite cells of Parvizian, Düster, Rank 2007; virtual nodes of Molino, Bao, Fedkiw 2004;
-//! friction by Haslinger's fixed point. Limits: static, linear material, small rotations; places that touch
-//! are found before anything moves; friction is that of the whole load at once; a piece's own faces do not
-//! touch each other.
+//! Sources: finite cells of Parvizian, Düster, Rank 2007; virtual nodes of Molino, Bao, Fedkiw 2004; friction
+//! by Haslinger's fixed point. Limits: static, linear material, small rotations. Contacts are found before
+//! anything moves. Friction is that of the whole load at once. A piece's own faces do not touch each other.
 
 mod body;
 mod cells;
@@ -43,29 +42,29 @@ use equilibrium::{Loads, Problem, State};
 use laws::Contact;
 use stress::Probe;
 
-/// Share of the load that takes up the play.
+/// Share of the load that takes up the play, in the first step.
 const SETTLING_SHARE: f64 = 0.01;
-/// How far the whole load would move a piece that nothing stops, mm: springs on pieces' frames are as stiff
-/// as that. They bear 0.2 % of the load where a piece has moved by 1 mm.
+/// Displacement of an unrestrained piece under the whole load, mm. It sets the stiffness of the springs on
+/// the pieces' frames, which take 0.2 % of the load where a piece has moved by 1 mm.
 const ASTRAY_MM: f64 = 500.0;
-/// A piece that has moved by this much is stopped by nothing, mm.
+/// Displacement from which a piece counts as stopped by nothing, mm.
 const LOST_MM: f64 = 20.0;
-/// How far inside a face its material is looked for, mm.
+/// Depth below a face at which its material is sought, mm.
 const BELOW_MM: f64 = 0.2;
-/// g/cm³ in t/mm³.
+/// Conversion from g/cm³ to t/mm³.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
 
-/// How finished pieces are modelled.
+/// Parameters of the model of finished pieces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidParams {
-    /// Edge of the cells, mm. [0.5, 20]; 2.5. Voxels are a fifth of it; what is thinner than one is lost, and
-    /// channels narrower than two close up.
+    /// Edge length of the cells, mm. [0.5, 20]; 2.5. Voxels are a fifth of it. Material thinner than a voxel
+    /// is lost, and channels narrower than two voxels close up.
     pub cell_mm: f64,
-    /// Faces at most so far apart may touch, mm. (0, 10]; 0.8.
+    /// Greatest distance between faces that may touch, mm. (0, 10]; 0.8.
     pub reach_mm: f64,
-    /// How far contacts are apart, mm. [0.2, 20]; 2.
+    /// Distance between contacts, mm. [0.2, 20]; 2.
     pub spacing_mm: f64,
-    /// What pieces are made of.
+    /// Material of all the pieces.
     pub material: Material,
 }
 
@@ -81,7 +80,7 @@ impl Default for SolidParams {
 }
 
 impl SolidParams {
-    /// Every problem at once.
+    /// Returns all problems of the parameters at once.
     pub fn problems(&self) -> Vec<String> {
         let m = &self.material;
         let checks = [
@@ -100,93 +99,93 @@ impl SolidParams {
     }
 }
 
-/// Why finished pieces could not be tested.
+/// Reasons why finished pieces could not be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolidError {
-    /// Parameters out of range.
+    /// Some parameters are out of range.
     #[error("{}", .0.join("; "))]
     Params(Vec<String>),
-    /// There is no material at the size of voxels.
+    /// The piece has no material at voxel resolution.
     #[error("piece {} is thinner than the voxels of the simulation everywhere", .piece + 1)]
     Empty {
-        /// From 0.
+        /// Index of the piece, from 0.
         piece: usize,
     },
-    /// A piece is not one body.
+    /// A piece falls apart at voxel resolution.
     #[error("piece {} is not one body at the size of voxels: {percent:.1} % of it hangs on nothing", .piece + 1)]
     Apart {
-        /// From 0.
+        /// Index of the piece, from 0.
         piece: usize,
-        /// Of its volume.
+        /// Loose share of the piece's volume, %.
         percent: f64,
     },
-    /// More cells than memory is for.
+    /// The piece needs more cells than the memory limit allows.
     #[error("piece {} is too large for the simulation's cells; choose longer ones", .piece + 1)]
     TooLarge {
-        /// From 0.
+        /// Index of the piece, from 0.
         piece: usize,
     },
-    /// A force acts where there is no material.
+    /// A force acts at a place without material.
     #[error("at {at:?} there is no material of piece {}", .piece + 1)]
     NoMaterial {
-        /// From 0.
+        /// Index of the piece, from 0.
         piece: usize,
-        /// Where, mm.
+        /// Point of the force, mm.
         at: [f64; 3],
     },
-    /// There is no such piece, or a number is none.
+    /// A load is on a piece that does not exist, or not finite.
     #[error("a load is on piece {} of {n_pieces}, or not finite", .piece + 1)]
     Load {
-        /// From 0.
+        /// Index of the piece, from 0.
         piece: usize,
-        /// How many there are.
+        /// Number of pieces in the model.
         n_pieces: usize,
     },
     /// A stiffness matrix could not be factorised.
     #[error(transparent)]
     Factorisation(#[from] SparseError),
-    /// Contacts did not settle.
+    /// The contact iteration did not converge.
     #[error("the contact problem does not converge")]
     Contact,
-    /// The caller asked to stop.
+    /// The caller requested a stop.
     #[error("stopped")]
     Stopped,
 }
 
-/// A force on a piece's surface.
+/// Point force on a piece's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
-    /// The piece, from 0.
+    /// Index of the piece, from 0.
     pub part: u32,
-    /// Where, mm.
+    /// Point of the force, mm.
     pub at: Vec3,
-    /// N.
+    /// Force on the piece, N.
     pub force_n: Vec3,
 }
 
-/// Something on a piece that is held where it is.
+/// Region of a piece that is held in place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hold {
-    /// The piece, from 0.
+    /// Index of the piece, from 0.
     pub part: u32,
-    /// Where, mm.
+    /// Centre of the region, mm.
     pub at: Vec3,
-    /// How much of the surface, mm².
+    /// Area of the held surface, mm².
     pub area_mm2: f64,
 }
 
-/// What answers the forces.
+/// Reaction that balances the external forces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// What the model was told to hold.
+    /// The holds that the model was built with.
     Held,
-    /// The inertia of all pieces, as those of one body.
+    /// Inertia of all pieces, accelerated as one body.
     Inertia,
-    /// Nothing but weak springs.
+    /// Weak springs on the pieces, nothing else.
     Springs,
 }
 
-/// Finished pieces, their contacts, and what of their compliance is known.
+/// Finished pieces, their contacts, and the columns of compliance computed so far.
 pub struct SolidModel {
     params: SolidParams,
     elements: Elements,
@@ -196,20 +195,21 @@ pub struct SolidModel {
     probes: Vec<Vec<Probe>>,
 }
 
-/// How pieces have moved under a load.
+/// Displacements of the pieces under a load.
 pub struct Moved<'a> {
     model: &'a SolidModel,
     displaced: Vec<Vec<f64>>,
     frames: Vec<[f64; 6]>,
     settled: Vec<Vec<f64>>,
     settled_frames: Vec<[f64; 6]>,
-    /// How far friction's bounds are from the pressures, as a share of the load.
+    /// Difference between the friction bounds used and those of the contact pressures, as a share of the
+    /// load.
     pub friction_off: f64,
-    /// Contacts that bear.
+    /// Number of contacts that carry load.
     pub n_bearing: usize,
 }
 
-/// A place of a piece whose motion may be asked for.
+/// Place of a piece for which the displacement can be queried.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
     part: usize,
@@ -218,10 +218,11 @@ pub struct Spot {
 }
 
 impl SolidModel {
-    /// Grids and factorises `pieces`, and finds where they touch. `held` is what [`Answer::Held`] holds,
-    /// where it has material;     /// `is_connector` tells the material whose stress is counted apart.
+    /// Discretises and factorises `pieces`, and finds where they touch.
     ///
-    /// About a second a piece of 5000 mm² of wall on one core; about 100 MB each.
+    /// `held` are the holds of [`Answer::Held`]; those without material are skipped. `is_connector` marks the
+    /// material whose stress is reported separately. Takes about a second a piece of 5000 mm² of wall on one
+    /// core; about 100 MB each.
     pub fn new(
         params: &SolidParams,
         pieces: &[Solid],
@@ -276,7 +277,7 @@ impl SolidModel {
             let inside = BELOW_MM * touch.normal;
             let first = seat(touch.parts[0], touch.at[0], -inside);
             let second = seat(touch.parts[1], touch.at[1], inside);
-            // What is thinner than a voxel has no material to press on.
+            // Material thinner than a voxel has nothing to press on.
             if first.is_some() && second.is_some() {
                 ends.push([first, second]);
                 contacts.push(Contact::of_touch(&touch, youngs_modulus_mpa));
@@ -305,23 +306,23 @@ impl SolidModel {
         })
     }
 
-    /// Where the pieces may touch.
+    /// Places where the pieces may touch.
     pub fn touches(&self) -> &[Touch] {
         &self.touches
     }
 
-    /// Unknown displacements of all pieces.
+    /// Number of unknown displacements of all pieces.
     pub fn n_unknowns(&self) -> usize {
         self.compliance.bodies.iter().map(Body::n_rows).sum()
     }
 
-    /// Mass of all pieces, t.
+    /// Total mass of all pieces, t.
     pub fn mass_t(&self) -> f64 {
         let volume_mm3: f64 = self.compliance.bodies.iter().map(|b| b.volume_mm3).sum();
         volume_mm3 * self.density()
     }
 
-    /// Volume of each piece at the size of voxels, mm³.
+    /// Volume of each piece at voxel resolution, mm³.
     pub fn volumes_mm3(&self) -> Vec<f64> {
         self.compliance.bodies.iter().map(|b| b.volume_mm3).collect()
     }
@@ -330,7 +331,7 @@ impl SolidModel {
         self.params.material.density_g_cm3 * T_MM3_PER_G_CM3
     }
 
-    /// The material of piece `part` nearest to `at`, but for `within_mm`.
+    /// Finds the material of piece `part` that is nearest to `at`. `None` if there is none within reach.
     pub fn spot(&self, part: u32, at: Vec3) -> Option<Spot> {
         let place = self.compliance.bodies.get(part as usize)?.place(at, Vec3::ZERO)?;
         Some(Spot {
@@ -340,7 +341,7 @@ impl SolidModel {
         })
     }
 
-    /// How the pieces move under `pushes`, with friction of that coefficient between them.
+    /// Computes how the pieces move under `pushes`, with friction of the given coefficient between them.
     pub fn under_load(
         &mut self,
         pushes: &[Push],
@@ -353,7 +354,7 @@ impl SolidModel {
         let little = self.loads(pushes, &sides, SETTLING_SHARE);
         let mut contacts = self.contacts.clone();
         if answer != Answer::Held {
-            // Ground is no longer there: ends of holds are kept, but answer nothing.
+            // The ground is absent: the ends of holds are kept, but carry no load.
             contacts[self.touches.len()..].iter_mut().for_each(|c| {
                 c.is_fast = false;
                 c.gap_mm = f64::INFINITY;
@@ -376,8 +377,8 @@ impl SolidModel {
         })
     }
 
-    /// Equilibrium with friction that counts slip from `origin`, and how far its bounds are from the
-    /// pressures.
+    /// Computes the equilibrium with friction that counts slip from `origin`. Also returns the deviation of
+    /// the friction bounds from the pressures.
     fn answered(
         &mut self,
         contacts: &[Contact],
@@ -400,7 +401,7 @@ impl SolidModel {
         }
     }
 
-    /// Forces on each piece's unknowns, N.
+    /// Forces on the unknowns of each piece, N.
     fn sides(&self, pushes: &[Push], answer: Answer) -> Result<Vec<Vec<f64>>, SolidError> {
         let bodies = &self.compliance.bodies;
         let mut sides: Vec<Vec<f64>> = bodies.iter().map(|b| vec![0.0; b.n_rows()]).collect();
@@ -426,7 +427,7 @@ impl SolidModel {
         Ok(sides)
     }
 
-    /// Adds what the mass of all pieces, accelerated as one body, answers.
+    /// Adds the inertia forces of all pieces, accelerated as one body.
     fn add_inertia(&self, pushes: &[Push], sides: &mut [Vec<f64>]) {
         let bodies = &self.compliance.bodies;
         let points = || bodies.iter().flat_map(Body::points);
@@ -454,7 +455,7 @@ impl SolidModel {
         }
     }
 
-    /// That share of the forces as contacts and frames see them.
+    /// Scales the forces by `share` and projects them onto contacts and frames.
     fn loads(&self, pushes: &[Push], sides: &[Vec<f64>], share: f64) -> Loads {
         let free = self.displaced(sides, share, &vec![Vec3::ZERO; self.contacts.len()]);
         let size_n = share * pushes.iter().map(|p| p.force_n.length()).sum::<f64>().max(1e-9);
@@ -467,7 +468,7 @@ impl SolidModel {
         }
     }
 
-    /// Sum and moments of forces on a piece's unknowns.
+    /// Force and moment resultants of the forces on a piece's unknowns.
     fn on_frame(&self, part: usize, side: &[f64]) -> [f64; 6] {
         let body = &self.compliance.bodies[part];
         let mut sums = [0.0; 6];
@@ -485,7 +486,7 @@ impl SolidModel {
         sums
     }
 
-    /// Displacements of each piece relative to its frame, by a share of the loads and by contacts.
+    /// Displacements of each piece relative to its frame, under a share of the loads and the contact forces.
     fn displaced(&self, sides: &[Vec<f64>], share: f64, force_n: &[Vec3]) -> Vec<Vec<f64>> {
         let on_seats = self.compliance.on_seats(force_n);
         (0..sides.len())
@@ -506,12 +507,12 @@ impl SolidModel {
 }
 
 impl Moved<'_> {
-    /// How far a place has moved, mm.
+    /// Displacement of a place, mm.
     pub fn moved_mm(&self, spot: &Spot) -> Vec3 {
         self.at(spot, &self.displaced, &self.frames)
     }
 
-    /// How far it had moved when the play was taken up, mm.
+    /// Displacement of a place when the play had been taken up, mm.
     pub fn settled_mm(&self, spot: &Spot) -> Vec3 {
         self.at(spot, &self.settled, &self.settled_frames)
     }
@@ -523,7 +524,7 @@ impl Moved<'_> {
         by_frame + body.moved(&displaced[spot.part], &spot.place)
     }
 
-    /// Pieces (from 0) that nothing stops.
+    /// Pieces (from 0) that nothing stops, ascending.
     pub fn lost(&self) -> Vec<u32> {
         let most = |q: &[f64; 6]| q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         (0..)
@@ -533,7 +534,7 @@ impl Moved<'_> {
             .collect()
     }
 
-    /// Stress of walls and of connectors.
+    /// Stress level of the walls and of the connectors.
     pub fn stress(&self) -> [StressLevel; 2] {
         let model = self.model;
         let found: Vec<_> = (0..self.displaced.len())

@@ -1,16 +1,16 @@
 //! The volume-based metric (Sect. 5.1): walls and connectors as tetrahedra, linear elasticity, contact
 //! without friction.
 //!
-//! What no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness, and the
-//! condensation of that onto the points near the part's seams. What a plan adds, [`VolumeModel::resist`]
-//! hangs on those points: pins and channels (`connector`). A part's bars and wall condense to what contact
-//! sees of it, and contact is solved between these few unknowns (`contact`); rigid motions are kept apart, so
-//! that parts that come off are found exactly (`mechanism`).
+//! Work that no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness,
+//! and the condensation onto the points near the part's seams. [`VolumeModel::resist`] attaches a plan's pins
+//! and channels (`connector`) to those points. A part's bars and wall are condensed to what the contacts see,
+//! and the contact problem is solved in these few unknowns (`contact`). Rigid motions are kept apart, so that
+//! parts that come off are found exactly (`mechanism`).
 //!
 //! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at
-//! one place; displacements are small. Limits: no friction, no gap; where a thin model's walls overlap, each
-//! is whole. The floor of the channel is one-sided, and so are the walls' faces, which touch at mid-wall; the
-//! channel's other faces hold in both directions.
+//! the same place; displacements are small. Limits: no friction, no gap; overlapping walls of a thin
+//! model are each modelled whole. The floor of the channel is one-sided, and so are the walls' faces,
+//! which touch at mid-wall; the channel's other faces hold in both directions.
 
 mod bars;
 mod connector;
@@ -45,22 +45,23 @@ use part::Part;
 use rows::{ROWS, WALL};
 use unknowns::Labels;
 
-/// How the metric models walls and connectors.
+/// Parameters of the model of walls and connectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeParams {
-    /// Thickness of the wall, mm. (0, 20]; 2.0, as the printed parts.
+    /// Wall thickness, mm. (0, 20]; 2.0, as in the printed parts.
     pub wall_mm: f64,
-    /// Layers of prisms across the wall. [1, 8]; 1, which is enough for quadratic elements.
+    /// Number of layers of prisms across the wall. [1, 8]; 1, which is enough for quadratic elements.
     pub n_layers: usize,
-    /// Degree of the elements of walls. Quadratic: a plan costs the same, and linear ones are several times
+    /// Degree of the wall elements. Quadratic: a plan costs the same, and linear elements are several times
     /// too stiff.
     pub order: Order,
-    /// What parts are made of. The paper's resin.
+    /// Material of all the parts. Default: the paper's resin.
     pub material: Material,
     /// Separation force on each seam, N/mm. (0, 1000]; 0.01, the paper's 10 N/m. Openings are proportional to
     /// it.
     pub force_n_per_mm: f64,
-    /// Pull or overlap at a contact that counts as none, relative to the largest. [10⁻¹², 10⁻²]; 10⁻⁶.
+    /// Greatest pull or overlap at a contact that counts as zero, relative to the largest. [10⁻¹², 10⁻²];
+    /// 10⁻⁶.
     pub tolerance: f64,
 }
 
@@ -78,7 +79,7 @@ impl Default for VolumeParams {
 }
 
 impl VolumeParams {
-    /// Every problem at once.
+    /// Returns all problems of the parameters at once.
     pub fn problems(&self) -> Vec<String> {
         let m = &self.material;
         let checks = [
@@ -126,24 +127,25 @@ impl VolumeParams {
     }
 }
 
-/// Why the metric could not be computed.
+/// Reasons why the metric could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
-    /// Parameters out of range.
+    /// Some parameters are out of range.
     #[error("{}", .0.join("; "))]
     Params(Vec<String>),
-    /// The assembly names a point, part or station that it does not have, or a number that is none.
+    /// The assembly refers to a point, part or station that does not exist, or has a number that is not
+    /// finite.
     #[error("the assembly is inconsistent: {0}")]
     Assembly(&'static str),
     /// No wall fits below a triangle, however thin.
     #[error("triangle {0} has no area, or its normals point along it: remesh the surface")]
     FlatTriangle(u32),
-    /// There must be one joint, or none, for each station.
+    /// The number of joints differs from the number of stations.
     #[error("{joints} joints for {stations} stations")]
     Joints {
-        /// How many were given.
+        /// Number of joints that were given.
         joints: usize,
-        /// How many there must be.
+        /// Number of joints that are needed.
         stations: usize,
     },
     /// The fixed part does not exist.
@@ -152,15 +154,15 @@ pub enum VolumeError {
     /// A stiffness matrix could not be factorised.
     #[error(transparent)]
     Factorisation(#[from] SparseError),
-    /// There must be one force for each point of the assembly, all of them numbers.
+    /// The number of forces differs from the number of points, or a force is not finite.
     #[error("{forces} forces for {points} points, or one of them is not finite")]
     Forces {
-        /// How many were given.
+        /// Number of forces that were given.
         forces: usize,
-        /// How many there must be.
+        /// Number of forces that are needed.
         points: usize,
     },
-    /// No set of contacts was found that neither pulls nor overlaps.
+    /// No set of contacts was found that neither pull nor overlap.
     #[error("the contact problem does not converge")]
     Contact,
 }
@@ -168,39 +170,39 @@ pub enum VolumeError {
 /// Displacements at the joints in static equilibrium, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deflection {
-    /// At each station, of side a and side b, at the root and at the tip of the pin; zero where there is no
-    /// joint.
+    /// Displacements of sides a and b at each station, each at the root and at the tip of the pin; zero where
+    /// there is no joint.
     pub displacement_mm: Vec<[[Vec3; 2]; 2]>,
 }
 
-/// What no plan changes: the walls and what connectors see of them.
+/// Plan-independent data: the walls, and the part of them that connectors see.
 #[derive(Debug)]
 pub struct VolumeModel {
     params: VolumeParams,
     stations: Vec<Station>,
     steps: Vec<[u32; 2]>,
     part_of_point: Vec<u32>,
-    /// Whether the wall below each point is held.
+    /// True for points whose wall below is held.
     is_clamped: Vec<bool>,
-    /// The parts of each station's sides.
+    /// Parts on the two sides of each station.
     station_parts: Vec<[u32; 2]>,
-    /// Below each station's sides, on the inner surface.
+    /// Points on the inner surface below each station's two sides.
     inner_edge: Vec<[Vec3; 2]>,
     wall: Wall,
-    /// Tetrahedra about each station's sides.
+    /// Tetrahedra around each station's two sides.
     near: Vec<[Vec<u32>; 2]>,
     parts: Vec<Part>,
-    /// Place of each wall node among its part's kept ones.
+    /// Index of each wall node among its part's kept nodes.
     place_kept: Vec<Option<u32>>,
 }
 
 impl VolumeModel {
-    /// Builds and condenses the walls; about a second for 18 000 tetrahedra.
+    /// Builds and condenses the walls; takes about a second for 18 000 tetrahedra.
     pub fn new(params: &VolumeParams, assembly: &ShellAssembly) -> Result<Self, VolumeError> {
         Self::clamped(params, assembly, &[])
     }
 
-    /// The same with the wall below the points `clamped` held in place.
+    /// Builds the model with the wall below the points `clamped` held in place.
     pub fn clamped(
         params: &VolumeParams,
         assembly: &ShellAssembly,
@@ -272,19 +274,19 @@ impl VolumeModel {
         })
     }
 
-    /// Tetrahedra of all walls.
+    /// Number of tetrahedra of all walls.
     pub fn n_tets(&self) -> usize {
         self.wall.tets.len()
     }
 
-    /// The walls.
+    /// Walls of all the parts.
     pub fn wall(&self) -> &Wall {
         &self.wall
     }
 
-    /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or
-    /// which parts come off. Opening is the larger of the distances between male and female at the root and
-    /// at the tip of the pin.
+    /// Solves for the openings of the seams when `plan` joins the stations and `fixed_part` is held, or for
+    /// the parts that come off. An opening is the larger of the distances between male and female at the root
+    /// and at the tip of the pin.
     ///
     /// May be called from several threads at once.
     pub fn resist(&self, plan: &[Meeting], fixed_part: u32) -> Result<Resistance, VolumeError> {
@@ -305,7 +307,7 @@ impl VolumeModel {
         })
     }
 
-    /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that
+    /// Displacements of the parts when `fixed_part`, or only the clamped points, are held; or the parts that
     /// come off.
     pub fn equilibrium(
         &self,
@@ -342,7 +344,7 @@ impl VolumeModel {
         Ok(Ok(self.deflection(&responses, &equilibrium, &sections)))
     }
 
-    /// Displacements at the joints, from those along the rows.
+    /// Displacements at the joints, from those along the contact rows.
     fn deflection(
         &self,
         responses: &[Response],
@@ -406,7 +408,7 @@ impl VolumeModel {
         Labels::new(3 * self.parts[part as usize].kept.len(), self.stations.len())
     }
 
-    /// The bars of `part`, which of them meet at each section, and the front of each.
+    /// Bars of `part`, the range of them that meets at each section, and the front of each bar.
     fn bar_fronts<'a>(
         &self,
         part: u32,
@@ -425,7 +427,8 @@ impl VolumeModel {
         (own, spans, fronts)
     }
 
-    /// Compliance and drift from what is left of a part: its contact rows, and its load, if it has one.
+    /// Reads compliance and drift from the condensed front of a part: its contact rows, and its load, if it
+    /// has one.
     fn read(
         &self,
         part: u32,
@@ -479,7 +482,7 @@ impl VolumeModel {
             let Some(section) = &sections[station][side.index()] else {
                 continue;
             };
-            // Without its rows the station is in no bar, and has no connector.
+            // A station without rows is in no bar and has no connector.
             if response.rows.binary_search(&(station * ROWS)).is_ok() {
                 let (force, places) = section.load();
                 for place in places {
@@ -491,7 +494,7 @@ impl VolumeModel {
         response
     }
 
-    /// How a point of a connector moves with the wall of its side.
+    /// Weights of wall nodes that move a point of a connector with the wall of its side.
     fn hold(&self, station: usize, side: Side, x: Vec3) -> Vec<(u32, f64)> {
         let tets = self.near[station][side.index()].iter().map(|&t| {
             let t = t as usize;
@@ -544,7 +547,7 @@ fn check(assembly: &ShellAssembly, clamped: &[u32]) -> Result<(), VolumeError> {
     Err(VolumeError::Assembly(problem))
 }
 
-/// The tetrahedra below the triangles about each station's points.
+/// Tetrahedra below the triangles around each station's points.
 fn near_stations(assembly: &ShellAssembly, n_layers: usize) -> Vec<[Vec<u32>; 2]> {
     let mut about: Vec<Vec<u32>> = vec![Vec::new(); assembly.points.len()];
     for (i, t) in (0..).zip(&assembly.triangles) {

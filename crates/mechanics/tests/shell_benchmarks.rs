@@ -1,4 +1,4 @@
-//! Published benchmarks of shell elements: ours against their references.
+//! Published benchmarks of shell elements: our results against their references.
 //!
 //! `cargo test --release -p shellock-mechanics --test shell_benchmarks -- --nocapture` prints the table of
 //! docs/notes/shell.md. Quantities have the units of the sources, which are consistent.
@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_mechanics::{LoadCase, Material, ShellModel, Support};
 
-/// A grid of `cells` over the unit square, cut along diagonals that alternate, placed by `place`.
+/// Grid of `cells` over the unit square, cut along alternating diagonals, placed by `place`.
 fn grid(cells: [usize; 2], place: impl Fn(f64, f64) -> Vec3) -> TriMesh {
     let [nu, nv] = cells;
     let points = (0..=nv).flat_map(|j| (0..=nu).map(move |i| (i, j)));
@@ -37,8 +37,8 @@ fn grid(cells: [usize; 2], place: impl Fn(f64, f64) -> Vec3) -> TriMesh {
     }
 }
 
-/// The degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) are held at the points where
-/// `at` says so.
+/// Holds the degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) at the points selected
+/// by `at`.
 fn hold(mesh: &TriMesh, dofs: &str, at: impl Fn(Vec3) -> bool) -> Vec<Support> {
     let held = ['x', 'y', 'z', 'X', 'Y', 'Z'].map(|dof| dofs.contains(dof));
     let points = (0..).zip(&mesh.points).filter(|(_, p)| at(**p));
@@ -57,7 +57,7 @@ fn material(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Material {
     }
 }
 
-/// The displacements of `mesh` under `forces`.
+/// Displacements of `mesh` under `forces`.
 fn solve(
     mesh: &TriMesh,
     m: Material,
@@ -144,7 +144,7 @@ fn hemisphere(n: usize) -> f64 {
     solve(&mesh, material(6.825e7, 0.3), 0.04, &supports, forces)[nearest(&mesh, a)].x / 0.0940
 }
 
-/// Loads along the tip's width and across it.
+/// Deflections under loads along the tip's width and across it.
 fn twisted_beam(n: usize) -> [f64; 2] {
     let mesh = grid([3 * n / 2, n / 4], |u, v| {
         let angle = FRAC_PI_2 * u;
@@ -169,8 +169,8 @@ fn twisted_beam(n: usize) -> [f64; 2] {
     })
 }
 
-/// A quarter of a clamped square plate, 100 mm by 100 mm by 1 mm, under pressure: deflection and stress in
-/// the middle [Timoshenko and Woinowsky-Krieger, table 35, with more digits].
+/// Quarter of a clamped square plate, 100 mm by 100 mm by 1 mm, under pressure: deflection and stress in the
+/// middle [Timoshenko and Woinowsky-Krieger, table 35, with more digits].
 fn clamped_plate(n: usize) -> [f64; 2] {
     const PRESSURE: f64 = 1e-3;
     let mesh = grid([n, n], |u, v| Vec3::new(50.0 * u, 50.0 * v, 0.0));

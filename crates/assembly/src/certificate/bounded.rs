@@ -1,4 +1,4 @@
-//! Proofs of play as they are written.
+//! Proofs of play in the form of the certificate.
 
 use std::collections::BTreeMap;
 
@@ -7,39 +7,39 @@ use serde::{Deserialize, Serialize};
 use crate::PatchId;
 use crate::play::{KitPlay, Multipliers, Quantity};
 
-/// A contact with an area: a point of `a` that cannot rise past `b` while it moves sideways within a region.
+/// Contact with an area: a point of `a` that cannot rise past `b` while it moves sideways within a region.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BearingPoint {
-    /// The piece the point lies on.
+    /// Piece that the point lies on.
     pub a: PatchId,
-    /// The piece above it.
+    /// Piece above the point.
     pub b: PatchId,
-    /// The point, mm.
+    /// Position of the point, mm.
     pub point: [f64; 3],
     /// Unit vector from `a` to `b`.
     pub normal: [f64; 3],
-    /// Unit vector across it: regions are octagons whose first side is there.
+    /// Unit vector across the normal. Regions are octagons, whose first side lies in this direction.
     pub across: [f64; 3],
 }
 
-/// That some pieces stay within bounds, with the proof. docs/notes/certificate.md has the theorem.
+/// Claim that some pieces stay within bounds, with the proof. docs/notes/certificate.md has the theorem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounded {
-    /// Who moves, in ascending order; all others are held.
+    /// Moving pieces, in ascending order; all others are held.
     pub free: Vec<PatchId>,
-    /// The places of the turn and the displacement of each free piece among the quantities.
+    /// Indices of the rotation and the displacement of each free piece among the quantities.
     pub of_piece: Vec<[usize; 2]>,
-    /// What is bounded.
+    /// Bounded rotations and displacements.
     pub quantities: Vec<Quantity>,
-    /// A bearing, by its place in the certificate's list, and the quantities that say how far it goes:
-    /// displacement and turn.
+    /// Rows: a bearing, by its index in the certificate's list, and the quantities of its displacement and
+    /// rotation.
     pub rows: Vec<[usize; 3]>,
-    /// For each quantity and each of its axes: what bounds it against the axis, and along it, by places in
-    /// [`Bounded::rows`]; the row after the last is the key's slide.
+    /// Multipliers of each quantity and each of its axes, against the axis and along it. They refer to rows
+    /// by index in [`Bounded::rows`]; the row after the last is the key's slide.
     pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 
-/// The bearings that a kit's proofs name, each once, and the proofs.
+/// Bearings that a kit's proofs use, each once, and the proofs.
 pub(super) fn bounded(play: &KitPlay) -> (Vec<BearingPoint>, Vec<Bounded>) {
     let mut place: BTreeMap<usize, usize> = BTreeMap::new();
     for (bearing, _) in play.proofs.iter().flat_map(|proof| &proof.rows) {

@@ -1,11 +1,11 @@
-//! Proofs that contacts allow no motion, which need no solver to be checked.
+//! Proofs that contacts allow no motion; checking them needs no solver.
 //!
 //! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::motion`]). A proof is a
 //! positive multiplier `μ` for some of them. With `D = diag(min(μ, 1))`, let
 //!
 //! ```text
-//!  residual ≥ |Aᵀμ|        how far the multipliers, as forces, are from equilibrium
-//!  hold     ≤ σ_min(D A)   by how much every unit motion closes or opens contacts, weighted
+//!  residual ≥ |Aᵀμ|        deviation of the multipliers, as forces, from equilibrium
+//!  hold     ≤ σ_min(D A)   least weighted closing or opening of contacts by a unit motion
 //! ```
 //!
 //! *If `residual < hold`, then `x = 0` is the only solution of `A x ≤ 0`.* For such an `x`, all entries of `A
@@ -15,18 +15,19 @@
 //!  hold |x| ≤ ‖D A x‖₂ ≤ ‖D A x‖₁ ≤ −μᵀA x ≤ |Aᵀμ| |x| ≤ residual |x|,
 //! ```
 //!
-//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under
-//! `hold`. Weights end at 1 so that a few great forces do not drown the rest in the rounding of `(D A)ᵀ D A`.
+//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay below
+//! `hold`. Weights are limited to 1 so that a few large forces do not drown the rest in the rounding of
+//! `(D A)ᵀ D A`.
 //!
-//! With a piece that may leave, the multipliers are in equilibrium on it, too, and `hold` is the least
-//! singular value of the Schur complement that is left for the others: they then move by no more than
-//! `residual / hold` of the whole motion.
+//! If one piece may leave, the multipliers are in equilibrium on it, too. Then `hold` is the least singular
+//! value of the Schur complement that remains for the others: they move by at most `residual / hold` of the
+//! whole motion.
 //!
-//! Multipliers are found by giving each contact of a well-conditioned spanning set `S` the force 1 (a
-//! Cholesky factor of `A Aᵀ` with pivoting chooses it) and balancing `Aᵀ1_S` by the least-squares forces of
-//! all contacts. They exist exactly where nothing moves [Stiemke1915], and there are never more than `2 n` of
-//! them, for `n` unknowns. Because the multipliers of `S` are at least 1, `hold ≥ σ_min(A_S)`: the contacts
-//! that only balance may have forces near 0.
+//! The multipliers are found in two steps. Each contact of a well-conditioned spanning set `S`, chosen by a
+//! Cholesky factor of `A Aᵀ` with pivoting, gets the force 1. Then the least-squares forces of all contacts
+//! balance `Aᵀ1_S`. Multipliers exist exactly if nothing moves [Stiemke1915], and there are never more than
+//! `2 n` of them, for `n` unknowns. Because the multipliers of `S` are at least 1, `hold ≥ σ_min(A_S)`: the
+//! contacts that only balance may have forces near 0.
 
 use std::collections::BTreeMap;
 
@@ -38,46 +39,46 @@ use crate::PatchId;
 use crate::motion::{Freedom, Row, System};
 use crate::verify::contact::Contact;
 
-/// Rest of a load, as the sum of its components, from which refining starts.
+/// Residual of a load, as the sum of its components, from which refinement starts.
 const BALANCED: f64 = 1e-10;
-/// Forces below this share of the spanning contacts' carry nothing and are left out.
+/// Least force of a contact, as a share of the spanning contacts'; smaller ones are left out.
 const LEAST_FORCE: f64 = 1e-9;
-/// Squared part of a row outside the span of others below which it adds no rank. Rows are 1 to 2 long; a lock
-/// that rests on less is one of rounding.
+/// Least squared part of a row outside the span of others that adds rank. Rows are 1 to 2 long; a lock that
+/// relies on less is due to rounding.
 const DEPENDENT: f64 = 1e-9;
-/// A lock that rests on less is one of rounding: eigenvalues of 1 are known to about 1e-15, their roots to
-/// 3e-8.
+/// Least hold of a lock; a smaller one is due to rounding. Eigenvalues of 1 are known to about 1e-15, their
+/// roots to 3e-8.
 const LEAST_HOLD: f64 = 1e-6;
-/// Added to a matrix that may be singular, as a share of its mean diagonal.
+/// Regularisation of a matrix that may be singular, as a share of its mean diagonal.
 const SINGULAR: f64 = 1e-13;
-/// Corrections of the multipliers; each gains several digits, and two have been enough.
+/// Number of corrections of the multipliers; each gains several digits, and two have been enough.
 const CORRECTIONS: usize = 4;
 
-/// Multipliers that show that contacts allow no motion.
+/// Multipliers which prove that contacts allow no motion.
 pub(super) struct Proof {
     /// Contacts with their multipliers, all positive; in the order of the contacts.
     pub multipliers: Vec<(usize, f64)>,
-    /// `|Aᵀμ|`.
+    /// Residual of the equilibrium, `|Aᵀμ|`.
     pub residual: f64,
-    /// `σ_min(D A)`; greater than the residual. 1 where no piece is free.
+    /// Least singular value `σ_min(D A)`; greater than the residual. 1 if no piece is free.
     pub hold: f64,
 }
 
-/// What may move.
+/// Question for a proof: the pieces that may move.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
-    /// All pieces.
+    /// Number of all pieces.
     pub n_pieces: usize,
-    /// Those that do not move.
+    /// Pieces that do not move.
     pub held: &'a [PatchId],
-    /// A piece that may move as it likes, along this direction at least: nothing is claimed of it.
+    /// Piece that may move freely, along this direction at least: nothing is claimed of it.
     pub leaves: Option<(PatchId, Vec3)>,
-    /// Spins count as velocities at this distance from the origin, which twists are about, mm.
+    /// Distance from the origin, which twists are about, at which spins count as velocities, mm.
     pub length_mm: f64,
     pub freedom: Freedom,
 }
 
-/// A proof that no piece moves but the one that may leave; `None` where there is none.
+/// Proves that no piece moves except the one that may leave; `None` if there is no proof.
 pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Proof> {
     let Question {
         n_pieces,
@@ -124,10 +125,10 @@ pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Pro
     })
 }
 
-/// What the Gram matrix is worth for the other pieces when the free piece at `leaving` moves as it likes: the
-/// Schur complement, by the pseudo-inverse of its block.
+/// Schur complement of the Gram matrix for the other pieces while the free piece at `leaving` moves freely,
+/// by the pseudo-inverse of its block.
 fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64> {
-    /// Eigenvalues that are a smaller share of the greatest are the piece's own way out.
+    /// Share of the greatest eigenvalue below which a direction is the piece's own way out.
     const NO_HOLD: f64 = 1e-9;
     let own: Vec<usize> = (system.column(leaving)..system.column(leaving + 1)).collect();
     let others: Vec<usize> = (0..system.n).filter(|k| !own.contains(k)).collect();
@@ -150,11 +151,11 @@ fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64>
     rest
 }
 
-/// Rows of full rank, each the one with the largest part outside the span of those before it; the first of
-/// equals. Where a piece is leaving none is opened or closed by its way out, and they span all else that any
-/// do.
+/// Chooses rows of full rank, each with the largest part outside the span of those before it; ties go to the
+/// first. If a piece is leaving, none of the rows is opened or closed by its way out, and they span all other
+/// rows that are not.
 fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<usize>> {
-    /// A row along which the way out goes by more, as a share, opens or closes with it.
+    /// Share of a row's motion along the way out above which the row opens or closes with it.
     const TOUCHED: f64 = 1e-6;
     let mut way_out = DVector::zeros(system.n);
     let mut basis = Vec::<DVector<f64>>::new();
@@ -179,12 +180,12 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
             .reduce(first_of_most)
             .filter(|&i| outside_sq[i] > DEPENDENT);
         let Some(next) = next else {
-            // What is left may be other ways of the piece that leaves; the hold tells.
+            // The remaining directions may be other ways of the leaving piece; the hold decides.
             return leaving.map(|_| chosen);
         };
         let mut direction = DVector::zeros(system.n);
         system.add(&system.rows[next], 1.0, &mut direction);
-        // Twice is enough.
+        // Two passes are enough.
         for _ in 0..2 {
             basis
                 .iter()
@@ -201,7 +202,7 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
     Some(chosen)
 }
 
-/// `Aᵀμ`.
+/// Residual of the equilibrium, the vector `Aᵀμ`.
 fn rest(system: &System, multipliers: &BTreeMap<usize, f64>) -> DVector<f64> {
     let mut rest = DVector::zeros(system.n);
     multipliers
@@ -210,7 +211,7 @@ fn rest(system: &System, multipliers: &BTreeMap<usize, f64>) -> DVector<f64> {
     rest
 }
 
-/// `(D A)ᵀ D A`, the weights being the multipliers up to `most`.
+/// Weighted Gram matrix `(D A)ᵀ D A`, the weights being the multipliers up to `most`.
 fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>, most: f64) -> DMatrix<f64> {
     system.gram(
         multipliers
@@ -219,11 +220,11 @@ fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>, most: f64)
     )
 }
 
-/// Takes what is left of equilibrium out of the multipliers, by the change `δ` with the least `Σ (δ/μ)²`:
-/// small multipliers change little, and stay positive. `None` where one would not.
+/// Removes the residual from the multipliers by the change `δ` with the least `Σ (δ/μ)²`: small multipliers
+/// change little and stay positive. `None` if one would not.
 fn correct(system: &System, multipliers: &mut BTreeMap<usize, f64>) -> Option<()> {
     let mut gram = weighted_gram(system, multipliers, f64::INFINITY);
-    // A piece's way out is held by nothing, and nothing is to be taken out there.
+    // Nothing holds a piece along its way out, and there is no residual to remove there.
     let little = SINGULAR * gram.trace() / system.n as f64;
     (0..system.n).for_each(|k| gram[(k, k)] += little);
     let spread = Cholesky::new(gram)?.solve(&rest(system, multipliers));

@@ -1,4 +1,5 @@
-//! What is locked is certified, what moves is not, and play is what the gaps leave.
+//! Tests that locked assemblies are certified, that mobile ones are not, and that play is what the gaps
+//! allow.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -29,8 +30,7 @@ fn certified(kit: &Kit) -> Certificate {
     certify(files, &kit.pieces, &kit.plan, &evidence, 2.0 * HALF_GAP_MM).expect("the plan is whole")
 }
 
-/// Who but the key can move while the first piece is held; empty where a lock is claimed, which is where
-/// nobody can.
+/// Pieces other than the key that can move while the first piece is held. Empty exactly if a lock is claimed.
 fn movers(kit: &Kit) -> Vec<u32> {
     let moving = kit.verdict().findings.into_iter().find_map(|f| match f {
         Finding::ClusterMoves { motions } => Some(motions.iter().map(|m| m.piece.0).collect()),
@@ -80,7 +80,7 @@ fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
         panic!()
     };
     assert_eq!((&held[..], *leaves), (&[PatchId(0)][..], PatchId(2)));
-    // At most twice the unknowns of the two that are free.
+    // At most twice the number of unknowns of the two free pieces.
     assert!(
         multipliers.len() <= 24 && certificate.contacts.len() <= 24,
         "{multipliers:?}"
@@ -150,8 +150,8 @@ fn a_cap_that_touches_nothing_but_a_locked_lid_is_not_certified() {
 
 #[test]
 fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
-    // A bar that ends in a turned wheel: the wheel, piece 1, touches the bar alone, along a round axle and
-    // two flanks.
+    // A bar that ends in a turned wheel: the wheel, piece 1, touches only the bar, along a round axle and two
+    // flanks.
     let mut contacts = Vec::new();
     for i in 0..24 {
         let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
@@ -214,7 +214,7 @@ fn a_screw_is_not_certified_and_one_more_contact_locks_it() {
     for _ in 0..200 {
         let (sin, cos) = (rng.random::<f64>() * std::f64::consts::TAU).sin_cos();
         let point = Vec3::new(cos, sin, rng.random::<f64>() - 0.5);
-        // Any normal square to the screw's velocity z PITCH + z × p.
+        // Any normal perpendicular to the screw's velocity z PITCH + z × p.
         let velocity = (Vec3::Z * PITCH + Vec3::Z.cross(point)).normalize();
         let random = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
         contacts.push(contact(1, 0, point, velocity.cross(random).normalize()));
@@ -230,8 +230,8 @@ fn a_screw_is_not_certified_and_one_more_contact_locks_it() {
     assert!(is_locked(&contacts, 2, Freedom::Rigid));
 }
 
-/// Whether some subset of the pieces 1.. moves along one of `directions` past all others: brute force over
-/// the subsets of the directional blocking graphs.
+/// Returns true if some subset of the pieces 1.. moves along one of `directions` past all others: brute force
+/// over the subsets of the directional blocking graphs.
 fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> bool {
     let subsets = 1u32..1 << (n_pieces - 1);
     let moves = |subset: u32, piece: PatchId| piece.0 > 0 && subset >> (piece.0 - 1) & 1 == 1;
@@ -245,8 +245,8 @@ fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> 
     })
 }
 
-/// All directions in which something can begin to slide along faces with these normals, which have their
-/// opposites among them: the extreme rays of all cones that they cut out, and the normals.
+/// All directions in which a slide can begin along faces with these normals, which come in opposite pairs:
+/// the extreme rays of all cones that they cut out, and the normals.
 fn critical_directions(normals: &[Vec3]) -> Vec<Vec3> {
     let mut directions: Vec<Vec3> = normals.to_vec();
     for d in normals
@@ -280,7 +280,8 @@ fn no_subset_slides_out_of_what_is_certified_and_one_piece_slides_where_it_is_no
         let slides = a_subset_slides(&contacts, n_pieces, &directions);
         let locked = is_locked(&contacts, n_pieces as usize, Freedom::Translations);
         assert!(!(slides && locked), "round {round}: {contacts:?}");
-        // Of more pieces, some can slide in different directions at once, which no blocking graph shows.
+        // Some of three or more pieces can slide in different directions at once, which no blocking graph
+        // shows.
         assert!(n_pieces > 2 || slides || locked, "round {round}: {contacts:?}");
         (n_locked, n_sliding) = (n_locked + u32::from(locked), n_sliding + u32::from(slides));
     }
@@ -315,7 +316,8 @@ fn forty_pieces_are_proven_and_no_proof_names_more_contacts_than_twice_the_unkno
 
 #[test]
 fn gaps_of_a_row_add_up_when_all_may_move() {
-    // Piece 0, 1, 2 caged one in the other along every axis with gap g: 2 moves g alone and 2 g with 1.
+    // Pieces 0, 1 and 2 are caged one in the other along every axis with gap g: 2 moves g alone, and 2 g with
+    // 1.
     let mut contacts = Vec::new();
     for (a, b) in [(1, 0), (2, 1)] {
         for axis in 0..3 {

@@ -1,29 +1,28 @@
-//! Forces of contacts that balance a load as far as pushing can: non-negative least squares.
+//! Contact forces that balance a load as far as pushing can: non-negative least squares.
 
 use nalgebra::DVector;
 
 use super::system::{Row, System};
 
-/// By how much a contact may be violated, relative to the motion, when the search for contacts to add ends.
+/// Greatest violation of a contact, relative to the motion, at which the search for contacts to add ends.
 const VIOLATION: f64 = 1e-6;
-/// A contact whose part outside the span of the active ones is a smaller share of it adds nothing but
-/// rounding.
+/// Least share of a contact outside the span of the active ones; a smaller share adds only rounding errors.
 const INDEPENDENT: f64 = 1e-9;
-/// Rounds for each unknown before the search ends undecided, which counts as a motion. A guard against
-/// endless rounds by rounding; how many real assemblies need has not been measured.
+/// Rounds for each unknown before the search ends undecided, which counts as a motion. It guards against
+/// endless rounds due to rounding. The number that real assemblies need has not been measured.
 const ROUNDS: usize = 30;
 
-/// Forces `μ ≥ 0` of contacts, and what of a load they leave.
+/// Contact forces `μ ≥ 0`, and the rest of the load that they leave.
 pub(crate) struct Balance {
     /// Rows with their forces, all positive; the rows are independent.
     pub forces: Vec<(usize, f64)>,
-    /// `load + Aᵀμ`, the least that contacts can make of it.
+    /// Rest `load + Aᵀμ`, the least that contacts can leave of the load.
     pub rest: DVector<f64>,
 }
 
 impl System {
-    /// The forces that leave least of `load`; ends as soon as the rest's components sum to no more than
-    /// `enough`.
+    /// Finds the forces that leave the least rest of `load`. Ends as soon as the rest's components sum to no
+    /// more than `enough`.
     pub fn balance(&self, load: &DVector<f64>, enough: f64) -> Balance {
         let mut active = Active::default();
         let mut rest = load.clone();
@@ -42,7 +41,8 @@ impl System {
             is_refused.fill(false);
             let left_at_once = active.solve(self, load, entering);
             if left_at_once {
-                // Rounding: the contact that should have gained a force lost it. The next one may do better.
+                // Due to rounding, the contact that should have gained a force lost it. The next one may do
+                // better.
                 is_refused[entering] = true;
             }
             rest.copy_from(load);
@@ -56,7 +56,7 @@ impl System {
         }
     }
 
-    /// The row along which `−rest` violates its contact most, per length of the row.
+    /// Row along which `−rest` violates its contact most, relative to the row's length.
     fn most_violated(&self, rest: &DVector<f64>, is_refused: &[bool]) -> Option<usize> {
         let limit = -VIOLATION * rest.norm();
         let violation = |row: &Row| self.dot(row, rest) / self.dot_rows(row, row).sqrt();
@@ -68,17 +68,17 @@ impl System {
     }
 }
 
-/// The contacts that carry force, and the Cholesky factor of their products `A_P A_Pᵀ`.
+/// Contacts that carry force, and the Cholesky factor of their products `A_P A_Pᵀ`.
 #[derive(Default)]
 pub(super) struct Active {
     pub(super) rows: Vec<usize>,
     forces: Vec<f64>,
-    /// Row `i` has `i + 1` entries.
+    /// Lower triangular factor; row `i` has `i + 1` entries.
     lower: Vec<Vec<f64>>,
 }
 
 impl Active {
-    /// Adds a row with no force; `false`, and nothing is added, where it depends on the others.
+    /// Adds a row with no force. Returns `false` and adds nothing if the row depends on the others.
     pub(super) fn push(&mut self, system: &System, entering: usize) -> bool {
         let row = &system.rows[entering];
         let products: Vec<f64> = self
@@ -99,8 +99,8 @@ impl Active {
         true
     }
 
-    /// Moves the forces to the least-squares solution, dropping rows whose force would become negative.
-    /// Whether `entering` was the first to go.
+    /// Moves the forces to the least-squares solution, and drops rows whose force would become negative.
+    /// Returns true if `entering` was the first to be dropped.
     fn solve(&mut self, system: &System, base: &DVector<f64>, entering: usize) -> bool {
         let mut entering_left = false;
         let mut is_first = true;
@@ -135,7 +135,7 @@ impl Active {
         entering_left
     }
 
-    /// Solves with the factor.
+    /// Solves with the lower triangular factor.
     pub(super) fn forward(&self, right: &[f64]) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(right.len() + 1);
         for (line, b) in self.lower.iter().zip(right) {
@@ -159,7 +159,7 @@ impl Active {
         x
     }
 
-    /// Takes row `at` out of the factor; Givens rotations make it triangular again.
+    /// Removes row `at` from the factor; Givens rotations make it triangular again.
     pub(super) fn remove(&mut self, at: usize) {
         self.rows.remove(at);
         self.forces.remove(at);

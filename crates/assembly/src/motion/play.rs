@@ -1,25 +1,24 @@
-//! How far pieces move within their gaps: the greatest `c · x` with `A x ≤ g`.
+//! Play of pieces within their gaps: the greatest `c · x` with `A x ≤ g`.
 //!
-//! The allowed motions are a polyhedron; a corner is where as many independent limits meet as there are
-//! unknowns. With `B` the rows of these limits and `λ = B⁻ᵀ c` their forces, the corner is the farthest one
-//! where all forces push: the simplex method, with the inverse of `B` at hand.
+//! The allowed motions are a polyhedron. A corner is a point where as many independent limits meet as there
+//! are unknowns. With `B` the rows of these limits and `λ = B⁻ᵀ c` their forces, the corner where all forces
+//! push is the farthest one. This is the simplex method, with the inverse of `B` at hand.
 //!
-//! Of many thousand contacts few ever end a motion, and only those are looked at in a step. So
-//! 1. *climb*: let go of the limit that pulls most, go along its edge to the next one that is looked at,
-//!    until all push;
-//! 2. look at the contacts that the corner overdraws; where there are none, that is it;
-//! 3. *come back*: exchange a limit for the most overdrawn one such that all go on pushing (the dual method),
-//!    until none is overdrawn; again 1.
+//! Few of many thousand contacts ever end a motion, and only those are examined in a step:
+//! 1. *climb*: drop the limit that pulls most, move along its edge to the next examined one, until all push;
+//! 2. find the contacts that the corner violates; if there are none, the search ends;
+//! 3. *come back*: exchange a limit for the most violated one so that all keep pushing (the dual method),
+//!    until none is violated; repeat from 1.
 //!
-//! Each part ends: gaps are widened by some nanometres, each by its own, so that no more limits meet in a
-//! corner than it takes and every edge has a length; coming back does the like with the forces; and every
-//! round looks at more contacts.
+//! Each part terminates. Gaps are widened by some nanometres, each by its own amount, so that no more limits
+//! than necessary meet in a corner and every edge has a length. Step 3 perturbs the forces likewise. And
+//! every round examines more contacts.
 //!
-//! Bounds may come late: until a contact is looked at, no more than a lower end of its bound needs to be
+//! Bounds may be computed late: until a contact is examined, only a lower limit of its bound needs to be
 //! known.
 //!
-//! The next objective begins at the corner of the last one, so objectives that are alike should follow each
-//! other. Box limits [`FAR_MM`] away give the first corner.
+//! The next objective begins at the corner of the last one, so similar objectives should follow each other.
+//! Box limits [`FAR_MM`] away give the first corner.
 
 use std::collections::BTreeMap;
 
@@ -27,20 +26,20 @@ use nalgebra::{DMatrix, DVector};
 
 use super::system::{Row, System};
 
-/// Motions that go so far have no end, mm: any real gap ends them long before.
+/// Distance at which motions count as unlimited, mm: any real gap ends them long before.
 const FAR_MM: f64 = 1e3;
-/// Share of a force or a speed that counts as none.
+/// Share of a force or a speed that counts as zero.
 const FLAT: f64 = 1e-9;
-/// By how much a limit may be overdrawn, mm.
+/// Greatest violation of a limit that is accepted, mm.
 const OVERDRAWN_MM: f64 = 1e-9;
-/// Most by which gaps are widened to tell them apart, mm; far below what is told.
+/// Greatest widening of gaps to tell them apart, mm; far below the reported accuracy.
 const WIDENED_MM: f64 = 1e-6;
-/// The like for forces, as a share of the objective; it is taken out again in the next climb.
+/// Perturbation of the forces, as a share of the objective; the next climb removes it.
 const STRENGTHENED: f64 = 1e-6;
-/// Exchanges after which the inverse is computed anew, against rounding.
+/// Number of exchanges after which the inverse is recomputed, against rounding.
 const REFRESH: usize = 100;
 
-/// One inequality: `wrench` at the unknowns from `plus` on, less the same from `minus` on, stays below
+/// One inequality: `wrench` at the unknowns from `plus` on, minus the same from `minus` on, stays below
 /// `bound_mm`.
 struct Limit {
     wrench: [f64; 6],
@@ -50,49 +49,49 @@ struct Limit {
 }
 
 impl Limit {
-    /// What the limit says of a motion. Motions are padded by [`PAD`] zeros, which stand for what does not
-    /// move.
+    /// Value of the limit's linear form for a motion. Motions are padded by [`PAD`] zeros, which represent
+    /// pieces at rest.
     fn along(&self, motion: &[f64]) -> f64 {
         let (plus, minus) = (&motion[self.plus..][..6], &motion[self.minus..][..6]);
         (0..6).map(|k| self.wrench[k] * (plus[k] - minus[k])).sum()
     }
 }
 
-/// Zeros after each motion.
+/// Number of zeros after each motion.
 const PAD: usize = 6;
 
-/// The corner of the allowed motions that the last objective led to.
+/// Corner of the allowed motions that the last objective led to.
 #[derive(Clone)]
 pub(crate) struct Corner<'a> {
     limits: &'a Limits<'a>,
     x: Vec<f64>,
     active: Vec<usize>,
-    /// Columns of the inverse of the matrix whose rows are those of `active`: the edges of the corner.
+    /// Edges of the corner: columns of the inverse of the matrix whose rows are those of `active`.
     edges: Vec<Vec<f64>>,
     looked_at: Vec<usize>,
     is_looked_at: Vec<bool>,
-    /// Of all limits, as far as they are known; mm.
+    /// Bounds of all limits, as far as they are known; mm.
     bounds_mm: Vec<f64>,
-    /// Rows whose bound is known.
+    /// True for rows whose bound is known.
     is_settled: Vec<bool>,
     n_exchanges: usize,
 }
 
-/// What ends motions: first the contact rows, then a side of the box above and one below for each unknown.
+/// Limits of motions: first the contact rows, then for each unknown an upper and a lower side of the box.
 pub(crate) struct Limits<'a> {
     n: usize,
     n_rows: usize,
     all: Vec<Limit>,
-    /// The bound of a row, mm, infinite for none; where there is none, bounds are those of `all`.
+    /// Late bound of a row, mm, infinite for none. Without it, bounds are those of `all`.
     late: Option<&'a LateBound<'a>>,
 }
 
-/// The bound of a contact row, mm; infinite where it ends nothing.
+/// Bound of a contact row, mm; infinite if the row limits nothing.
 pub(crate) type LateBound<'a> = dyn Fn(usize) -> f64 + Sync + 'a;
 
 impl<'a> Limits<'a> {
-    /// Contact rows stay below the bounds that `late_mm` tells when they are looked at, at least `gaps_mm` ≥
-    /// 0, one a row.
+    /// Limits contact rows by bounds that `late_mm` computes when they are examined. These are at least
+    /// `gaps_mm` ≥ 0, one a row.
     pub fn late(system: &System, gaps_mm: &[f64], late_mm: &'a LateBound<'a>) -> Self {
         Self {
             late: Some(late_mm),
@@ -100,7 +99,7 @@ impl<'a> Limits<'a> {
         }
     }
 
-    /// Contact rows stay below `gaps_mm`, one a row, ≥ 0.
+    /// Limits contact rows by `gaps_mm`, one a row, ≥ 0.
     pub fn new(system: &System, gaps_mm: &[f64]) -> Self {
         let n = system.n;
         let contact = |(i, (row, gap_mm)): (usize, (&Row, &f64))| Limit {
@@ -129,13 +128,13 @@ impl<'a> Limits<'a> {
     }
 }
 
-/// A number in [0.5, 1) for each `i`, in no order: the fractions of multiples of the golden ratio.
+/// Number in [0.5, 1) for each `i`, irregularly distributed: the fractions of multiples of the golden ratio.
 fn scattered(i: usize) -> f64 {
     0.5 + 0.5 * ((i + 1) as f64 * 0.618_033_988_749_894_9).fract()
 }
 
 impl<'a> Corner<'a> {
-    /// Any corner.
+    /// Creates a corner to start from.
     pub fn new(limits: &'a Limits<'a>) -> Self {
         let Limits { n, n_rows, .. } = *limits;
         let edge = |i: usize| (0..n + PAD).map(|k| f64::from(u8::from(i == k))).collect();
@@ -155,20 +154,20 @@ impl<'a> Corner<'a> {
         corner
     }
 
-    /// The greatest `objective · x`; `None` where it has no end.
+    /// Greatest `objective · x`; `None` if it is unlimited.
     pub fn farthest(&mut self, objective: &DVector<f64>) -> Option<f64> {
         self.ended(objective).map(|_| dot(objective.as_slice(), &self.x))
     }
 
-    /// Rows with the forces that show how far `objective · x` goes: they add up to the objective, but for
-    /// rounding. `None` where it has no end.
+    /// Rows with the forces that prove the greatest `objective · x`: they add up to the objective, except for
+    /// rounding. `None` if it is unlimited.
     pub fn ended(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.go_farthest(objective.as_slice());
         self.ending(objective)
     }
 
-    /// As [`Corner::ended`], by the rows alone that were looked at before: no nearer an end, and sooner
-    /// found.
+    /// Like [`Corner::ended`], but only with rows that were examined before: the bound is no tighter, and
+    /// faster to find.
     pub fn ended_by_known(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.climb(objective.as_slice());
         self.come_back(objective.as_slice());
@@ -176,7 +175,7 @@ impl<'a> Corner<'a> {
         self.ending(objective)
     }
 
-    /// Rows that are looked at.
+    /// Rows that have been examined.
     pub fn looked_at(&self) -> impl Iterator<Item = usize> + '_ {
         self.looked_at
             .iter()
@@ -184,7 +183,7 @@ impl<'a> Corner<'a> {
             .filter(|&limit| limit < self.limits.n_rows)
     }
 
-    /// The motion of the corner.
+    /// Motion at the present corner.
     pub fn motion(&self) -> &[f64] {
         &self.x[..self.limits.n]
     }
@@ -210,7 +209,7 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// From a corner that all limits that are looked at allow to the farthest one.
+    /// Moves from a corner that all examined limits allow to the farthest such corner.
     fn climb(&mut self, objective: &[f64]) {
         while let Some(leaving) = self.most_pulling(&self.forces(objective)) {
             let way: Vec<f64> = self.edges[leaving].iter().map(|x| -x).collect();
@@ -221,8 +220,8 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// From a corner whose limits all push to the farthest one that all limits that are looked at allow, or
-    /// one near it.
+    /// Moves from a corner whose limits all push to the farthest one that all examined limits allow, or one
+    /// near it.
     fn come_back(&mut self, objective: &[f64]) {
         let mut objective = objective.to_vec();
         let more = STRENGTHENED * dot(&objective, &objective).sqrt();
@@ -237,12 +236,12 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Of the active limits, against the objective.
+    /// Forces of the active limits against the objective.
     fn forces(&self, objective: &[f64]) -> Vec<f64> {
         self.edges.iter().map(|edge| dot(objective, edge)).collect()
     }
 
-    /// The place of the limit along whose edge the objective rises most steeply.
+    /// Index of the limit along whose edge the objective rises most steeply.
     fn most_pulling(&self, forces: &[f64]) -> Option<usize> {
         let least = -FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
         let pulling = (0..forces.len()).filter(|&i| forces[i] < least);
@@ -253,7 +252,7 @@ impl<'a> Corner<'a> {
             .map(|p| p.0)
     }
 
-    /// The limit that is met first along `way`: of those met at the same place, the one met most squarely.
+    /// First limit that is met along `way`; of those met at the same place, the one met most squarely.
     fn first_met(&self, way: &[f64]) -> Option<usize> {
         let least_speed = FLAT * dot(way, way).sqrt();
         let met = self.looked_at.iter().map(|&i| (i, self.limits.all[i].along(way)));
@@ -269,12 +268,12 @@ impl<'a> Corner<'a> {
         first.max_by(|a, b| a.1.total_cmp(&b.1)).map(|m| m.0)
     }
 
-    /// How far the corner is from the limit, mm.
+    /// Distance from the corner to the limit, mm.
     fn room_mm(&self, limit: usize) -> f64 {
         self.bounds_mm[limit] - self.limits.all[limit].along(&self.x)
     }
 
-    /// Of what is looked at, the limit that the corner overdraws most.
+    /// Examined limit that the corner violates most.
     fn most_overdrawn(&self) -> Option<usize> {
         let overdrawn = self
             .looked_at
@@ -284,7 +283,7 @@ impl<'a> Corner<'a> {
         overdrawn.min_by(|a, b| a.1.total_cmp(&b.1)).map(|o| o.0)
     }
 
-    /// The place of the limit that `entering`, as it begins to push, takes all force from first.
+    /// Index of the limit that loses its force first as `entering` begins to push.
     fn first_relieved(&self, forces: &[f64], entering: usize) -> Option<usize> {
         let shares = self.shares(entering);
         let least = FLAT * shares.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
@@ -300,7 +299,7 @@ impl<'a> Corner<'a> {
         first.max_by(|&i, &k| shares[i].total_cmp(&shares[k]))
     }
 
-    /// The limit's row as a sum of the active ones.
+    /// Coefficients of the limit's row as a sum of the active ones.
     fn shares(&self, limit: usize) -> Vec<f64> {
         self.edges
             .iter()
@@ -319,7 +318,7 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Puts a limit in the place of an active one and goes to the corner where they all meet.
+    /// Replaces an active limit by another, and moves to the corner where they all meet.
     fn exchange(&mut self, leaving: usize, entering: usize) {
         let shares = self.shares(entering);
         self.active[leaving] = entering;
@@ -344,7 +343,7 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Computes the inverse anew, unless rounding has left none.
+    /// Recomputes the inverse, unless rounding has made the matrix singular.
     fn refresh(&mut self) {
         let n = self.limits.n;
         let mut rows = DMatrix::zeros(n, n);
@@ -360,8 +359,8 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Looks at the contact of each pair of pieces that the corner overdraws most: its neighbours would say
-    /// the same. Whether there is any that was not looked at before.
+    /// Examines, for each pair of pieces, the contact that the corner violates most; its neighbours would
+    /// limit the motion equally. Returns true if there was any that had not been examined before.
     fn look_at_overdrawn(&mut self) -> bool {
         let mut overdrawn = BTreeMap::<(usize, usize), Vec<(f64, usize)>>::new();
         for i in (0..self.is_looked_at.len()).filter(|&i| !self.is_looked_at[i]) {
@@ -373,7 +372,7 @@ impl<'a> Corner<'a> {
         }
         let mut has_any = false;
         for mut of_pair in overdrawn.into_values() {
-            // Late bounds may let go of a contact; the next one is asked then.
+            // A late bound may release a contact; then the next one is tried.
             while let Some(at) = (0..of_pair.len()).min_by(|&i, &k| of_pair[i].0.total_cmp(&of_pair[k].0)) {
                 let (room_mm, i) = of_pair[at];
                 if room_mm >= -OVERDRAWN_MM {
@@ -391,7 +390,7 @@ impl<'a> Corner<'a> {
         has_any
     }
 
-    /// Looks at a row from now on.
+    /// Adds a row to the examined ones.
     pub fn look_at(&mut self, row: usize) {
         self.settle(row);
         if !self.is_looked_at[row] {
@@ -400,7 +399,7 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Learns the row's bound.
+    /// Computes the late bound of the row.
     fn settle(&mut self, row: usize) {
         if let Some(late) = self.limits.late.filter(|_| !self.is_settled[row]) {
             self.bounds_mm[row] = late(row) + WIDENED_MM * scattered(row);
@@ -409,7 +408,7 @@ impl<'a> Corner<'a> {
     }
 }
 
-/// Scalar product, up to the end of the shorter one.
+/// Scalar product, up to the end of the shorter vector.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

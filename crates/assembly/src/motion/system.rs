@@ -1,4 +1,4 @@
-//! Contacts as inequalities.
+//! Contacts as linear inequalities on velocities.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use shellock_geom::Vec3;
@@ -8,39 +8,39 @@ use super::forces::Balance;
 use super::{Freedom, Twist};
 use crate::PatchId;
 
-/// Mean opening speed of the contacts that counts as none. The outside judge bounds the program's optimum
-/// by 1e-6, which ours is an upper bound of.
+/// Mean opening speed of the contacts that counts as zero. The outside judge bounds the optimum of its
+/// program by 1e-6; ours is an upper bound of that optimum.
 const OPENING: f64 = 5e-7;
-/// Least over greatest eigenvalue of `AᵀA` below which pieces can slide without opening a contact; the
-/// outside judge has 1e-7.
+/// Least ratio of smallest to greatest eigenvalue of `AᵀA`, below which pieces can slide without opening a
+/// contact; the outside judge has 1e-7.
 const SLIDING: f64 = 1.5e-7;
-/// Part of the fastest component from which a piece counts as moving.
+/// Share of the fastest component from which a piece counts as moving.
 const MOVES: f64 = 0.05;
 
 /// One contact as a row of `A`: `wrench` at the columns of `plus`, its opposite at those of `minus`.
 pub(crate) struct Row {
-    /// Its place in the list of contacts.
+    /// Index in the list of contacts.
     pub contact: usize,
-    /// Where the unknowns of `a` begin; `None` where it is held.
+    /// First unknown of `a`; `None` if `a` is held.
     pub(super) plus: Option<usize>,
-    /// The same of `b`.
+    /// First unknown of `b`; `None` if `b` is held.
     pub(super) minus: Option<usize>,
-    /// Force and moment.
+    /// Force and moment of the contact.
     pub(super) wrench: [f64; 6],
 }
 
 /// The contacts of some free pieces as inequalities `A x ≤ 0` on their velocities and scaled spins.
 pub(crate) struct System {
-    /// Unknowns of a piece: 3 or 6.
+    /// Number of unknowns of a piece: 3 or 6.
     dof: usize,
-    /// Unknowns of all free pieces.
+    /// Number of unknowns of all free pieces.
     pub n: usize,
-    /// One for each contact with a free piece.
+    /// Rows, one for each contact with a free piece.
     pub rows: Vec<Row>,
 }
 
 impl System {
-    /// `free` in ascending order; `scale_mm` makes spins comparable to velocities.
+    /// Builds the system for `free`, in ascending order; `scale_mm` makes spins comparable to velocities.
     pub fn new(contacts: &[Contact], free: &[PatchId], scale_mm: f64, freedom: Freedom) -> Self {
         let dof = if freedom == Freedom::Rigid { 6 } else { 3 };
         let column = |id: PatchId| free.binary_search(&id).ok().map(|i| i * dof);
@@ -66,19 +66,19 @@ impl System {
         }
     }
 
-    /// Where the unknowns of the free piece at `position` begin.
+    /// First unknown of the free piece at `position`.
     pub fn column(&self, position: usize) -> usize {
         position * self.dof
     }
 
-    /// `a · x`.
+    /// Product `a · x` of a row and a motion.
     pub fn dot(&self, row: &Row, x: &DVector<f64>) -> f64 {
         let part =
             |at: Option<usize>| at.map_or(0.0, |at| (0..self.dof).map(|k| row.wrench[k] * x[at + k]).sum());
         part(row.plus) - part(row.minus)
     }
 
-    /// Adds `factor · a` to `x`.
+    /// Adds `factor · a` to the vector `x`.
     pub fn add(&self, row: &Row, factor: f64, x: &mut DVector<f64>) {
         for (at, sign) in [(row.plus, 1.0), (row.minus, -1.0)] {
             if let Some(at) = at {
@@ -87,7 +87,7 @@ impl System {
         }
     }
 
-    /// The product of two rows.
+    /// Scalar product of two rows.
     pub fn dot_rows(&self, a: &Row, b: &Row) -> f64 {
         let product: f64 = (0..self.dof).map(|k| a.wrench[k] * b.wrench[k]).sum();
         let meets = |x: Option<usize>, y: Option<usize>| f64::from(u8::from(x.is_some() && x == y));
@@ -97,7 +97,7 @@ impl System {
                 - meets(a.minus, b.plus))
     }
 
-    /// Mean of the rows, `Aᵀ1 / m`.
+    /// Mean of all rows, `Aᵀ1 / m`.
     fn mean(&self) -> DVector<f64> {
         let mut mean = DVector::zeros(self.n);
         self.rows
@@ -106,13 +106,13 @@ impl System {
         mean
     }
 
-    /// A motion that opens contacts and closes none, or `None` where there is none.
+    /// Finds a motion that opens contacts and closes none; `None` if there is none.
     pub(super) fn opening_motion(&self) -> Option<DVector<f64>> {
         let Balance { rest, .. } = self.balance(&self.mean(), OPENING);
         (rest.lp_norm(1) > OPENING).then(|| -rest)
     }
 
-    /// `Σ w a aᵀ` over the given rows `a` and weights `w`.
+    /// Gram matrix `Σ w a aᵀ` over the given rows `a` and weights `w`.
     pub fn gram<'a>(&self, rows: impl Iterator<Item = (&'a Row, f64)>) -> DMatrix<f64> {
         let mut gram = DMatrix::<f64>::zeros(self.n, self.n);
         for (row, weight) in rows {
@@ -130,7 +130,7 @@ impl System {
         gram
     }
 
-    /// A motion along which all contacts slide, or `None` where there is none.
+    /// Finds a motion along which all contacts slide; `None` if there is none.
     pub(super) fn sliding_motion(&self) -> Option<DVector<f64>> {
         let eigen = SymmetricEigen::new(self.gram(self.rows.iter().map(|row| (row, 1.0))));
         let least = eigen.eigenvalues.imin();
@@ -138,7 +138,7 @@ impl System {
             .then(|| eigen.eigenvectors.column(least).into_owned())
     }
 
-    /// The motion of each piece that moves, the fastest component of all being 1.
+    /// Motions of the pieces that move, scaled so that the fastest component of all is 1.
     pub(super) fn twists(&self, x: &DVector<f64>, free: &[PatchId]) -> Vec<Twist> {
         let scale = 1.0 / x.amax().max(f64::MIN_POSITIVE);
         let part = |at: usize| Vec3::new(x[at], x[at + 1], x[at + 2]) * scale;

@@ -1,11 +1,11 @@
-//! How far a point can rise before a surface stops it, while it moves sideways by no more than a radius.
+//! Height that a point can reach before a surface stops it, while it moves sideways by at most a radius.
 //!
-//! Let the point start at height 0 on an axis, and let `S` be what of a closed surface hangs together, within
-//! the open cylinder of the radius about the axis, with a triangle above the point. Edges within the cylinder
-//! have triangles of `S` on both sides, so `S` is a cycle modulo the cylinder's wall: how often a ray upwards
-//! meets it is the same, modulo 2, for all places that a path within the cylinder joins without crossing `S`.
-//! Where the point meets it an odd number of times, and `S` ends at a height `g`, no such path leads above
-//! `g`.
+//! Let the point start at height 0 on an axis. Let `S` be the part of a closed surface that is connected,
+//! within the open cylinder of the radius about the axis, with a triangle above the point. Edges within the
+//! cylinder have triangles of `S` on both sides, so `S` is a cycle modulo the cylinder's wall. So the number
+//! of sheets of `S` above a place is constant, modulo 2, along a path within the cylinder that does not cross
+//! `S`. If this number is odd at the point, and the highest place of `S` has height `g`, no such path leads
+//! above `g`.
 //!
 //! ```text
 //!        |   ______   |  g: the highest place of S within the cylinder
@@ -14,30 +14,30 @@
 //!        |<--r->|     |
 //! ```
 //!
-//! Nothing else is asked of the surface: it may be rough, and neither a graph over the disc nor parallel to
-//! it.
+//! The surface needs no other property: it may be rough, and need be neither a graph over the disc nor
+//! parallel to it.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-/// Triangles of a barrier before it is given up: real ones have some tens.
+/// Greatest number of triangles of a barrier before the search gives up: real ones have some tens.
 const MOST_TRIANGLES: usize = 380;
-/// Sides of a region.
+/// Number of sides of a region.
 pub(super) const SIDES: usize = 8;
 
-/// A convex region across an axis, around it: how far each of its sides is from the axis, mm.
+/// Convex region around an axis, perpendicular to it, given by the distance of each side from the axis, mm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub far_mm: [f64; SIDES],
 }
 
 impl Region {
-    /// As far to every side.
+    /// Region with equal distances to all sides.
     pub fn of_radius(mm: f64) -> Self {
         Self { far_mm: [mm; SIDES] }
     }
 
-    /// Unit vectors towards the sides.
+    /// Unit vectors towards the region's sides.
     fn sides(&self) -> [[f64; 2]; SIDES] {
         const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
         [
@@ -53,7 +53,7 @@ impl Region {
     }
 }
 
-/// A closed surface with its triangles' neighbours.
+/// Closed surface with the neighbours of its triangles.
 pub(super) struct Surface {
     pub mesh: TriMesh,
     pub tree: TriangleBvh,
@@ -63,7 +63,7 @@ pub(super) struct Surface {
     start: Vec<u32>,
 }
 
-/// Where a barrier is looked for: heights are along `normal` from `origin`.
+/// Axis of a search for a barrier: heights are along `normal` from `origin`.
 #[derive(Clone, Copy)]
 pub(super) struct Axis {
     origin: Vec3,
@@ -72,7 +72,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// `normal` is a unit vector.
+    /// Builds the axis; `normal` is a unit vector.
     pub fn new(origin: Vec3, normal: Vec3) -> Self {
         let u = normal.any_orthonormal_vector();
         Self {
@@ -82,31 +82,31 @@ impl Axis {
         }
     }
 
-    /// The directions in space of a region's sides.
+    /// Directions in space of a region's sides.
     pub fn sides(&self) -> [Vec3; SIDES] {
         Region::of_radius(0.0)
             .sides()
             .map(|[x, y]| self.across[0] * x + self.across[1] * y)
     }
 
-    /// Place across the axis, and height.
+    /// Coordinates across the axis, and height.
     fn local(&self, p: Vec3) -> Vec3 {
         let d = p - self.origin;
         Vec3::new(d.dot(self.across[0]), d.dot(self.across[1]), d.dot(self.normal))
     }
 }
 
-/// What of a triangle is within a cylinder.
+/// Part of a triangle that lies within a region.
 struct Clip {
     highest: f64,
-    /// Which edges come into the cylinder.
+    /// True for edges that enter the region.
     edges: [bool; 3],
-    /// Height on the axis, where the triangle covers it.
+    /// Height of the triangle on the axis, if it covers the axis.
     on_axis: Option<f64>,
 }
 
 impl Surface {
-    /// `mesh` has one name for each place.
+    /// Builds the surface of `mesh`, which has only one index for each position.
     pub fn new(mesh: &TriMesh) -> Self {
         let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * mesh.triangles.len());
         for (f, t) in mesh.triangles.iter().enumerate() {
@@ -141,19 +141,19 @@ impl Surface {
         }
     }
 
-    /// The height of the barrier that hangs together with triangle `from`, above the origin, for sideways
-    /// moves of up to `radius_mm`; `None` where it ends above `most_mm` or is none.
+    /// Height above the origin of the barrier connected with triangle `from`, for sideways motions within
+    /// `region`. `None` if it ends above `most_mm` or is no barrier.
     pub fn barrier_mm(&self, from: u32, axis: &Axis, region: &Region, most_mm: f64) -> Option<f64> {
         let (highest, n_above) = self.flood(from, axis, region, most_mm)?;
         (n_above % 2 == 1).then_some(highest)
     }
 
-    /// The highest place of what hangs together with triangle `from` within the cylinder, if below `most_mm`.
+    /// Highest place of everything connected with triangle `from` within the region, if below `most_mm`.
     pub fn highest_mm(&self, from: u32, axis: &Axis, region: &Region, most_mm: f64) -> Option<f64> {
         self.flood(from, axis, region, most_mm).map(|found| found.0)
     }
 
-    /// Also how many triangles are above the origin.
+    /// Highest place, and the number of triangles above the origin.
     fn flood(&self, from: u32, axis: &Axis, region: &Region, most_mm: f64) -> Option<(f64, usize)> {
         let (mut highest, mut n_above) = (f64::NEG_INFINITY, 0);
         let (mut found, mut next) = (vec![from], 0);
@@ -182,7 +182,7 @@ impl Surface {
     }
 }
 
-/// What of a triangle, as places across an axis and heights, is within `region`; `None` for nothing.
+/// Clips a triangle, in coordinates across an axis and heights, to `region`; `None` if nothing remains.
 fn clip(t: [Vec3; 3], region: &Region) -> Option<Clip> {
     let mut polygon: Vec<(Vec3, Option<usize>)> = Vec::with_capacity(3 + SIDES);
     let mut next = Vec::with_capacity(3 + SIDES);
@@ -199,7 +199,7 @@ fn clip(t: [Vec3; 3], region: &Region) -> Option<Clip> {
             }
             if (from < 0.0) != (to < 0.0) {
                 let cut = p + (q - p) * (from / (from - to));
-                // Going out, the region's side begins here; coming in, the rest of the edge.
+                // On the way out, the region's side begins here; on the way in, the rest of the edge.
                 next.push((cut, if from < 0.0 { None } else { edge }));
             }
         }
@@ -222,13 +222,13 @@ fn clip(t: [Vec3; 3], region: &Region) -> Option<Clip> {
     })
 }
 
-/// Whether a ray along the axis passes the triangle: half-open, so that it passes one of two that share an
-/// edge.
+/// Returns true if a ray along the axis passes through the triangle. The test is half-open, so the ray passes
+/// exactly one of two triangles that share an edge.
 fn covers_axis(t: [Vec3; 3]) -> bool {
     let mut is_inside = false;
     for k in 0..3 {
         let (mut p, mut q) = (t[k], t[(k + 1) % 3]);
-        // The same order for both triangles of the edge.
+        // Use the same order for both triangles of the edge.
         if (p.y, p.x) > (q.y, q.x) {
             std::mem::swap(&mut p, &mut q);
         }
@@ -251,7 +251,8 @@ mod tests {
     use shellock_geom::Volume;
     use shellock_testkit::shapes::cuboid;
 
-    /// The barrier of `roof` above the origin, which the point is `sideways` off from, for moves of `radius`.
+    /// Barrier that `roof` forms above the origin, which is `sideways` off the centre, for motions of
+    /// `radius`.
     fn above(roof: &Volume, sideways: f64, radius: f64) -> Option<f64> {
         let surface = Surface::new(&roof.to_mesh());
         let origin = Vec3::new(sideways, 0.0123, 0.0);
@@ -283,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_slope_is_as_high_as_its_highest_place_within_the_radius() {
-        // 45 degrees, 0.5 above the origin.
+        // A slope of 45 degrees, 0.5 above the origin.
         let corners = [
             [-3.0, -3.0, -2.5],
             [3.0, -3.0, 3.5],
@@ -328,7 +329,7 @@ mod tests {
         );
     }
 
-    /// Points dropped at random paths: none that stays within the radius gets past a barrier.
+    /// Points that follow random paths: none that stays within the radius passes a barrier.
     #[test]
     fn no_walk_gets_past_the_barrier_of_a_rough_roof() {
         use rand::RngExt;

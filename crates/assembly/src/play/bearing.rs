@@ -1,10 +1,10 @@
-//! Contacts with an area: places where a piece cannot rise past another while it moves sideways by no more
-//! than so much.
+//! Bearings: contacts with an area. At such a place, a piece cannot rise past another while it moves sideways
+//! within a limited region.
 //!
-//! A point `p` of piece `a` faces piece `b`; `n`, from `a` to `b`, is the opposite of the normal of the
-//! triangle of `b` that is nearest. How high the barrier of `b` above `p` is for sideways moves within a
-//! region is [`super::barrier`]'s question. The surface of `a` beside `p` must be no speck: it falls away by
-//! less than [`BED_DROP_MM`] over a half-disc of [`BED_MM`].
+//! A point `p` of piece `a` faces piece `b`. `n`, from `a` to `b`, is opposite to the normal of the nearest
+//! triangle of `b`. [`super::barrier`] computes the height of the barrier of `b` above `p` for sideways
+//! motions within a region. The surface of `a` beside `p` must be wide enough: it falls away by less than
+//! [`BED_DROP_MM`] over a half-disc of [`BED_MM`].
 
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
@@ -13,43 +13,43 @@ use super::barrier::{Axis, Region, SIDES, Surface};
 use crate::verify::sample;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Distance of neighbouring points, mm: the best of them ends a turn about a connector of 1 mm.
+/// Distance between neighbouring points, mm: the best of them ends a rotation about a connector of 1 mm.
 pub(super) const SPACING_MM: f64 = 0.35;
-/// The same for pieces whose proof does not close with the former.
+/// Finer distance for pieces whose proof does not close with [`SPACING_MM`].
 pub(super) const FINE_SPACING_MM: f64 = 0.2;
-/// Most points on one piece: what has more area beside others is no piece of a kit.
+/// Greatest number of points on one piece; no piece of a kit has more area beside others.
 const MOST_POINTS: f64 = 1e6;
-/// What may come on top of the clearance between faces that end motions, mm.
+/// Greatest distance beyond the clearance between faces that limit motions, mm.
 const REACH_MM: f64 = 0.2;
-/// Faces whose normals have a greater scalar product do not face each other (37° from opposite).
+/// Greatest scalar product of the normals of two faces that face each other (37° from opposite).
 const FACING: f64 = -0.8;
-/// The surface of a piece beside a contact's point is at least this wide to one side, mm.
+/// Least width of a piece's surface beside a contact's point, to one side, mm.
 pub const BED_MM: f64 = 0.3;
-/// Within that it falls away by less than this, mm.
+/// Greatest drop of the surface over that width, mm.
 pub const BED_DROP_MM: f64 = 0.08;
-/// Barriers that are higher above the point hold nothing, mm.
+/// Height above the point from which a barrier holds nothing, mm.
 pub const MOST_RISE_MM: f64 = 1.0;
-/// The bed's half-disc begins so far behind the point, mm: the point may be at an edge.
+/// Start of the bed's half-disc behind the point, mm, since the point may be at an edge.
 pub const BEHIND_MM: f64 = 0.01;
 
-/// A point of piece `a` that a surface of piece `b` is above.
+/// Point of piece `a` below a surface of piece `b`.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearing {
-    /// The piece that the point is on.
+    /// Piece that the point lies on.
     pub a: PatchId,
-    /// The piece above it.
+    /// Piece above the point.
     pub b: PatchId,
-    /// On `a`, mm.
+    /// Point on piece `a`, mm.
     pub point: Vec3,
-    /// Unit vector, from `a` to `b`.
+    /// Unit vector from `a` to `b`.
     pub normal: Vec3,
-    /// Distance to `b`, mm: the barrier is at least so high.
+    /// Distance to `b`, mm: the barrier is at least as high.
     pub gap_mm: f64,
-    /// The triangle of `a` that the point is on.
+    /// Triangle of `a` that the point lies on.
     face: u32,
 }
 
-/// The pieces' surfaces, prepared for questions of what is above their points.
+/// Surfaces of the pieces, prepared for searches above their points.
 pub(super) struct Surfaces(IdVec<PatchId, Surface>);
 
 impl Surfaces {
@@ -58,18 +58,18 @@ impl Surfaces {
         Self(surfaces.into_iter().collect())
     }
 
-    /// All pieces.
+    /// Ids of all pieces.
     pub fn ids(&self) -> impl Iterator<Item = PatchId> + '_ {
         self.0.ids()
     }
 
-    /// The surface of a piece.
+    /// Mesh of a piece's surface.
     pub fn mesh(&self, piece: PatchId) -> &TriMesh {
         &self.0[piece].mesh
     }
 
-    /// Of the pieces that count, the place nearest to `p` within `reach_mm`: which piece, where, and the
-    /// outward normal of the triangle there.
+    /// Finds the place nearest to `p` within `reach_mm` on the pieces that `counts` accepts: the piece, the
+    /// place, and the outward normal of the triangle there.
     pub fn nearest(
         &self,
         p: Vec3,
@@ -93,7 +93,7 @@ impl Surfaces {
         best.map(|(_, id, point, normal)| (id, point, normal))
     }
 
-    /// Points of all pieces that face others, in order of `a`, then along its surface, then of `b`.
+    /// Samples points of all pieces that face others, in order of `a`, then along its surface, then of `b`.
     pub fn bearings(&self, ctx: &Ctx, clearance_mm: f64, seed: u64) -> Result<Vec<Bearing>, Cancelled> {
         let ids: Vec<PatchId> = self.0.ids().collect();
         let found: Vec<Vec<Bearing>> = ids
@@ -107,7 +107,7 @@ impl Surfaces {
         Ok(found.into_iter().flatten().collect())
     }
 
-    /// More points of `piece` that face others, and of others that face it.
+    /// Samples more points of `piece` that face others, and of others that face it.
     pub fn finer(&self, piece: PatchId, clearance_mm: f64, seed: u64) -> Vec<Bearing> {
         let reach_mm = clearance_mm + REACH_MM;
         let seed = seed.wrapping_add(1000 + u64::from(piece.0));
@@ -120,7 +120,7 @@ impl Surfaces {
         own.into_iter().chain(of_others).collect()
     }
 
-    /// Points of `a` that face those pieces that count.
+    /// Samples points of `a` that face the pieces that `counts` accepts.
     fn on_piece(
         &self,
         a: PatchId,
@@ -178,22 +178,22 @@ impl Surfaces {
         samples.par_iter().flat_map_iter(of_sample).collect()
     }
 
-    /// How far the bearing's point rises while it moves sideways within `region`, mm; `None` where nothing
-    /// stops it.
+    /// Height that the bearing's point can reach while it moves sideways within `region`, mm; `None` if
+    /// nothing stops it.
     pub fn rise_mm(&self, bearing: &Bearing, region: &Region) -> Option<f64> {
         let axis = bearing.axis();
         let above = &self.0[bearing.b];
         let (from, _) = above
             .tree
             .first_hit(bearing.point, bearing.normal, MOST_RISE_MM)?;
-        // From within the other piece its surface is seen from inside, and stops nothing.
+        // From inside the other piece, its surface is seen from inside and stops nothing.
         if above.mesh.face_normal(from as usize).dot(bearing.normal) >= 0.0 {
             return None;
         }
         above.barrier_mm(from, &axis, region, MOST_RISE_MM)
     }
 
-    /// Whether the surface of `a` is wide enough beside the bearing's point.
+    /// Returns true if the surface of `a` is wide enough beside the bearing's point.
     pub fn has_bed(&self, bearing: &Bearing) -> bool {
         let axis = Axis::new(bearing.point, -bearing.normal);
         let is_bed = |side: usize| {
@@ -215,7 +215,7 @@ impl Bearing {
         self.axis().sides()[0]
     }
 
-    /// Where regions of sideways moves are.
+    /// Axis of the regions of sideways motions.
     pub(super) fn axis(&self) -> Axis {
         Axis::new(self.point, self.normal)
     }

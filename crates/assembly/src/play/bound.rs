@@ -1,13 +1,14 @@
-//! Bounds of all that some pieces can do, found by iteration and proven by multipliers.
+//! Bounds on all motions of some pieces, found by iteration and proven by multipliers.
 //!
-//! An assumption says how far each of a few quantities goes. It says how far each bearing's point goes
-//! sideways, so how high its barrier is, so what the linear program over all bearings allows. Where that is
-//! within the assumption, no path from rest leaves it (docs/notes/certificate.md). Else the assumption is
+//! An assumption bounds a few quantities. From it follow the region of each bearing's point, hence the height
+//! of its barrier, hence the motions that the linear program over all bearings allows. If these are within
+//! the assumption, no path from rest leaves it (docs/notes/certificate.md). Otherwise the assumption is
+//! widened slightly beyond the result, and tried again.
 //! widened to what was found and a little more, and tried again.
 //!
-//! Only few bearings end a motion, and only for these it matters how far they go: each round begins with the
-//! pieces' own turns and displacements and goes on to the cells of the bearings that end these, until no more
-//! are needed.
+//! Only a few bearings end a motion, and only their regions matter. So each round begins with the pieces' own
+//! rotations and displacements. It continues with the cells of the bearings that end these, until no more are
+//! needed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
@@ -23,73 +24,73 @@ use crate::motion::{Corner, Freedom, Limits, System};
 use crate::verify::contact::Contact;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Widenings of an assumption before it is given up.
+/// Number of widenings of an assumption before it is given up.
 const ROUNDS: usize = 20;
-/// What goes farther is not held, mm and rad.
+/// Limits above which a piece counts as not held, mm and rad.
 const MOST_SHIFT_MM: f64 = 6.0;
 const MOST_TURN: f64 = 0.3;
-/// By how much more an assumption is widened than what was found, as a share, and mm or rad.
+/// Margin of a widened assumption beyond the result, as a share, and in mm or rad.
 const WIDER: f64 = 1.05;
 const WIDER_MM: f64 = 0.004;
 const WIDER_RAD: f64 = 0.0002;
-/// Turns count as displacements at this distance, mm.
+/// Distance at which rotations count as displacements, mm.
 const LENGTH_MM: f64 = 50.0;
-/// Each quantity goes both ways along three axes.
+/// Number of directions of a quantity: both ways along three axes.
 const WAYS: usize = 6;
-/// What rounding may add to a bound, as a share of it and mm or rad.
+/// Margin of a bound for rounding, as a share of it and in mm or rad.
 const ROUNDING: f64 = 1e-6;
 
-/// How far the key may have slid on its way out.
+/// Distance that the key may have slid on its way out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slide {
-    /// The key.
+    /// Key of the kit.
     pub key: PatchId,
-    /// The piece that it is measured against.
+    /// Piece against which the slide is measured.
     pub seat: PatchId,
-    /// The place of the key that is measured, mm.
+    /// Point of the key that is measured, mm.
     pub at: [f64; 3],
-    /// Its way out, a unit vector.
+    /// Way out of the key, a unit vector.
     pub along: [f64; 3],
-    /// How far, mm.
+    /// Greatest slide of the key, mm.
     pub most_mm: f64,
 }
 
-/// Rows by their places, with multipliers, which are positive.
+/// Rows by their indices, with positive multipliers.
 pub type Multipliers = Vec<(usize, f64)>;
 
-/// The proof that some pieces go no farther than told.
+/// Proof that some pieces stay within stated bounds.
 #[derive(Clone, Debug)]
 pub struct Proof {
-    /// Who moves, in ascending order; all others are held.
+    /// Moving pieces, in ascending order; all others are held.
     pub free: Vec<PatchId>,
-    /// The places of the turn and the displacement of each free piece among the quantities.
+    /// Indices of the rotation and the displacement of each free piece among the quantities.
     pub of_piece: Vec<[usize; 2]>,
-    /// What is bounded.
+    /// Bounded rotations and displacements.
     pub quantities: Vec<Quantity>,
-    /// The bearings that end motions, by their place in the list of all, each with the quantities of its cell
-    /// and its turn.
+    /// Bearings that end motions, by their index in the list of all, each with the quantities of its cell and
+    /// its rotation.
     pub rows: Vec<(usize, [usize; 2])>,
-    /// For each quantity and axis, against it and along it: rows with multipliers. The row after the last is
+    /// Multipliers of the rows for each quantity and axis, against it and along it. The row after the last is
     /// the slide.
     pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 
-/// What became of a question.
+/// Answer to a question about play.
 pub(super) struct Answer {
-    /// How far each free piece goes where sideways moves and turns are taken as none: its displacement, mm,
-    /// and its turn, rad; empty where something has no end.
+    /// Play of each free piece, neglecting the effects of sideways motions and rotations: displacement, mm,
+    /// and rotation, rad. Empty if something is unlimited.
     pub linear: Vec<[f64; 2]>,
-    /// Motions of the one free piece that go there: displacement of its centre, mm, and turn, rad; empty
-    /// where several are free.
+    /// Motions of the only free piece that reach this play: displacement of its centre, mm, and rotation,
+    /// rad. Empty if several pieces are free.
     pub swings: Vec<[f64; 6]>,
-    /// The bearings that hold, of those that were asked in any round.
+    /// Bearings that hold, of those whose barrier was computed in any round.
     pub asked: BTreeSet<usize>,
-    /// The proof, or why there is none.
+    /// Proof, or the reason why there is none.
     pub proof: Result<Proof, Open>,
 }
 
 impl Answer {
-    /// The same, where the bearings it was found of follow `n_before` others.
+    /// Renumbers the answer for a list in which `n_before` other bearings come first.
     pub fn after(self, n_before: usize) -> Self {
         let proof = self.proof.map(|proof| Proof {
             rows: proof
@@ -107,47 +108,48 @@ impl Answer {
     }
 }
 
-/// Why a proof does not close.
+/// Reasons why a proof does not close.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Open {
-    /// Something goes too far, or has no end.
+    /// A quantity is too large, or unlimited.
     Far,
-    /// Widening came to no end.
+    /// The widening did not converge.
     Rounds,
 }
 
-/// Which bearings are looked at.
+/// Set of bearings that are considered.
 #[derive(Clone, Copy)]
 pub(super) enum Candidates<'a> {
-    /// All of the free pieces.
+    /// All bearings of the free pieces.
     All,
-    /// Of these, the free pieces' own.
+    /// Bearings of the free pieces in this set.
     Some(&'a BTreeSet<usize>),
 }
 
-/// The question: who is free, and what is known of bearings.
+/// Question about play: the free pieces, and the known bearings.
 pub(super) struct Problem<'a> {
     pub surfaces: &'a Surfaces,
-    /// All there are.
+    /// All bearings of the kit.
     pub bearings: &'a [Bearing],
-    /// Those that are looked at.
+    /// Bearings that are considered.
     pub candidates: Candidates<'a>,
     pub centers: &'a IdVec<PatchId, Vec3>,
     pub slide: &'a Slide,
-    /// In ascending order.
+    /// Free pieces, in ascending order.
     pub free: &'a [PatchId],
-    /// How far every face stands back, mm: printed thin. Proofs are of faces as they are, 0.
+    /// Distance by which every face is set back, mm, as if printed thin. Proofs are about faces as they are,
+    /// 0.
     pub set_back_mm: f64,
 }
 
-/// What one round found of a quantity: for each axis, against it and along it, the multipliers; or that it
-/// has no end.
+/// Result of one round for a quantity: the multipliers for each axis, against it and along it, or `None` if
+/// it is unlimited.
 type Ends = Vec<[Option<Multipliers>; 2]>;
 
-/// What ends one way of a quantity, if anything does, and the motion that goes there.
+/// Multipliers that end one direction of a quantity, if any, and the motion that goes farthest.
 type End = (Option<Multipliers>, DVector<f64>);
 
-/// What a round found: what ends each quantity that matters, and all motions that go there.
+/// Results of a round: the ends of each relevant quantity, and the motions that reach them.
 struct Found {
     ends: BTreeMap<usize, Ends>,
     motions: Vec<DVector<f64>>,
@@ -158,7 +160,7 @@ impl Problem<'_> {
         self.free.binary_search(&p).is_ok()
     }
 
-    /// The bearings of the free pieces that are looked at, by their place among all.
+    /// Bearings of the free pieces that are considered, by index in the list of all.
     fn own(&self) -> Vec<usize> {
         let is_candidate = |i: usize| match self.candidates {
             Candidates::All => true,
@@ -170,7 +172,8 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// How far each free piece goes where sideways moves and turns are taken as none, as in [`Answer::linear`].
+    /// Play of each free piece, neglecting the effects of sideways motions and rotations, as in
+    /// [`Answer::linear`].
     pub fn small_motions(&self) -> Vec<[f64; 2]> {
         let bearings: Vec<Bearing> = self.own().iter().map(|&i| self.bearings[i]).collect();
         let quantities = Quantities::new(self.free, self.centers, &bearings);
@@ -181,7 +184,7 @@ impl Problem<'_> {
             .map_or_else(Vec::new, |found| quantities.linear(&round.found(&found.ends)))
     }
 
-    /// Looks for the proof. The answer is a function of the question alone, on any number of threads.
+    /// Searches for the proof. The answer depends on the question alone, on any number of threads.
     pub fn solve(&self, ctx: &Ctx) -> Result<Answer, Cancelled> {
         let own = self.own();
         let bearings: Vec<Bearing> = own.iter().map(|&i| self.bearings[i]).collect();
@@ -222,7 +225,8 @@ impl Problem<'_> {
                 let proof = Ok(round.proof(&own, ends, found));
                 return Ok(Answer { proof, ..answer });
             }
-            // What no bearing needed yet is assumed to go as far as in the motions that were found.
+            // Quantities that no bearing needed yet are assumed to be as large as in the motions that were
+            // found.
             for (q, found) in found.into_iter().chain(guesses) {
                 let quantity = &mut quantities.all[q];
                 let (most, least) = if quantity.at.is_some() {
@@ -245,7 +249,7 @@ impl Problem<'_> {
 }
 
 impl Problem<'_> {
-    /// The motions that go farthest along the axes of a piece's own quantities, which are asked first.
+    /// Motions that go farthest along the axes of a piece's own quantities, which are computed first.
     fn swings(&self, motions: &[DVector<f64>]) -> Vec<[f64; 6]> {
         let n_own = if self.free.len() == 1 { 2 * WAYS } else { 0 };
         let swing = |m: &DVector<f64>| std::array::from_fn(|k| if k < 3 { m[k] } else { m[k] / LENGTH_MM });
@@ -253,7 +257,7 @@ impl Problem<'_> {
     }
 }
 
-/// One assumption, and the linear program that it makes.
+/// One assumption, and the linear program that follows from it.
 struct Round<'a> {
     problem: &'a Problem<'a>,
     bearings: &'a [Bearing],
@@ -262,7 +266,7 @@ struct Round<'a> {
     center: Vec3,
     system: System,
     errors_mm: Vec<f64>,
-    /// Bounds of rows, as far as they were asked for.
+    /// Bounds of rows, computed on demand.
     told: Vec<OnceLock<f64>>,
 }
 
@@ -316,7 +320,7 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// The least that a row's bound can be.
+    /// Least possible bound of a row, mm.
     fn least_mm(&self, row: usize) -> f64 {
         let i = self.system.rows[row].contact;
         self.bearings.get(i).map_or_else(
@@ -325,12 +329,12 @@ impl<'a> Round<'a> {
         )
     }
 
-    /// How much wider a gap is than it looks: both faces stand back.
+    /// Amount by which gaps are wider than the meshes show, mm: both faces are set back.
     fn set_back_mm(&self) -> f64 {
         2.0 * self.problem.set_back_mm
     }
 
-    /// What bounds the slide, which is measured like the point of a bearing.
+    /// Bound of the slide, mm, which is measured like the point of a bearing.
     fn slide_mm(&self) -> f64 {
         let (slide, q) = (self.problem.slide, self.quantities);
         let of = |p: PatchId| {
@@ -347,12 +351,12 @@ impl<'a> Round<'a> {
         slide.most_mm + 0.5 * seat * (far(slide.key) + far(slide.seat)) + 0.5 * (key + seat) * far(slide.key)
     }
 
-    /// A row's bound: how far its bearing's point rises, and the error.
+    /// Bound of a row, mm: the height that its bearing's point can reach, plus the error.
     fn bound_mm(&self, row: usize) -> f64 {
         *self.told[row].get_or_init(|| self.measured_mm(row))
     }
 
-    /// The bearings that were asked and hold.
+    /// Bearings whose barrier was computed and that hold.
     fn holding(&self) -> impl Iterator<Item = usize> + '_ {
         let is_held = |row: &usize| self.told[*row].get().is_some_and(|mm| mm.is_finite());
         let contact = |row: usize| self.system.rows[row].contact;
@@ -379,7 +383,7 @@ impl<'a> Round<'a> {
         })
     }
 
-    /// What ends each quantity that matters, and the motions that go there; `None` where one has no end.
+    /// Ends of each relevant quantity, and the motions that reach them; `None` if one is unlimited.
     fn ends(&self) -> Option<Found> {
         let least: Vec<f64> = (0..self.system.rows.len())
             .map(|row| self.least_mm(row))
@@ -387,8 +391,8 @@ impl<'a> Round<'a> {
         let late = |row: usize| self.bound_mm(row);
         let limits = Limits::late(&self.system, &least, &late);
         let start = Corner::new(&limits);
-        // One after the other where they are small, else one lane a way: each begins where its last one
-        // ended.
+        // Small problems run in one lane, others in one lane per direction. Each solve begins where the last
+        // one of its lane ended.
         let n_lanes = if self.problem.free.len() > 1 { WAYS } else { 1 };
         let mut lanes = vec![start; n_lanes];
         let mut ends: BTreeMap<usize, Ends> = BTreeMap::new();
@@ -428,7 +432,8 @@ impl<'a> Round<'a> {
                 }
             }
             wanted = needed.into_iter().filter(|q| !ends.contains_key(q)).collect();
-            // What one lane looked at, all know: the rest is bounded by known rows.
+            // All lanes learn the rows that one lane examined: the remaining quantities are bounded by known
+            // rows.
             let known: BTreeSet<usize> = lanes.iter().flat_map(Corner::looked_at).collect();
             lanes
                 .par_iter_mut()
@@ -437,7 +442,7 @@ impl<'a> Round<'a> {
         Some(Found { ends, motions })
     }
 
-    /// How far the quantities that no bearing needed go in these motions.
+    /// Greatest values in these motions of the quantities that no bearing needed.
     fn guesses(&self, ends: &BTreeMap<usize, Ends>, motions: &[DVector<f64>]) -> Vec<(usize, Vec<[f64; 2]>)> {
         let all = 0..self.quantities.all.len();
         let unknown: Vec<usize> = all.filter(|q| !ends.contains_key(q)).collect();
@@ -453,7 +458,7 @@ impl<'a> Round<'a> {
         unknown.par_iter().map(guess).collect()
     }
 
-    /// Whether the quantity is a piece's own: for these, all bearings are looked through.
+    /// Returns true if the quantity is a piece's own. For these, all bearings are examined.
     fn is_of_piece(&self, quantity: usize) -> bool {
         self.quantities
             .of_piece
@@ -461,13 +466,13 @@ impl<'a> Round<'a> {
             .any(|of_piece| of_piece.contains(&quantity))
     }
 
-    /// How far a quantity goes along an axis (`side` 1) or against it (0), as a function of the unknowns.
+    /// Linear form of a quantity along an axis (`side` 1) or against it (0), in the unknowns.
     fn objective(&self, quantity: usize, axis: usize, side: usize) -> DVector<f64> {
         let d = Vec3::from(self.quantities.all[quantity].axes[axis]);
         self.along(quantity, if side == 1 { d } else { -d })
     }
 
-    /// How far a quantity goes along a direction, as a function of the unknowns.
+    /// Linear form of a quantity along a direction, in the unknowns.
     fn along(&self, quantity: usize, d: Vec3) -> DVector<f64> {
         let q = &self.quantities.all[quantity];
         let (velocity, spin) = match q.at {
@@ -488,14 +493,14 @@ impl<'a> Round<'a> {
         objective
     }
 
-    /// How far each quantity goes, for each axis against it and along it.
+    /// Bounds of each quantity, against each axis and along it.
     fn found(&self, ends: &BTreeMap<usize, Ends>) -> BTreeMap<usize, Vec<[f64; 2]>> {
         ends.iter()
             .map(|(&q, ends)| (q, ends.iter().map(|e| self.values(q, e)).collect()))
             .collect()
     }
 
-    /// How far the multipliers show that a quantity goes, against an axis and along it.
+    /// Bounds of a quantity that the multipliers prove, against an axis and along it.
     fn values(&self, quantity: usize, ends: &[Option<Multipliers>; 2]) -> [f64; 2] {
         let least = if self.quantities.all[quantity].at.is_some() {
             ROUNDING
@@ -512,8 +517,8 @@ impl<'a> Round<'a> {
         })
     }
 
-    /// The proof that all quantities stay within what was `found`. A piece's own are bounded along more
-    /// lines, by the rows that are known.
+    /// Builds the proof that all quantities stay within `found`. A piece's own quantities are also bounded
+    /// along more lines, by the known rows.
     fn proof(
         &self,
         own: &[usize],
@@ -574,8 +579,8 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// Bounds the pieces' own quantities along the lattice's other lines, by rows that have a part in the
-    /// proof already.
+    /// Bounds the pieces' own quantities along the other lines of the lattice, by rows that the proof already
+    /// uses.
     fn add_lines(&self, quantities: &mut BTreeMap<usize, Quantity>, ends: &mut BTreeMap<usize, Ends>) {
         let known: BTreeSet<usize> = ends
             .values()

@@ -1,4 +1,4 @@
-//! What is bounded: how far some turns and displacements go.
+//! Bounded quantities: rotations and displacements of pieces.
 
 use std::collections::BTreeMap;
 
@@ -10,26 +10,26 @@ use super::barrier::Region;
 use super::bearing::Bearing;
 use crate::{IdVec, LatticeDirection, PatchId};
 
-/// Side of the cells that bearings of a pair are gathered in, mm.
+/// Edge of the cells in which bearings of a pair of pieces are grouped, mm.
 const CELL_MM: f64 = 2.5;
-/// A vector that goes no farther than 1 along any lattice direction is no longer than this: the inverse of
+/// Greatest length of a vector whose component along every lattice direction is at most 1: the inverse of
 /// `1/√(1 + (√2−1)² + (√3−√2)²)`.
 const BETWEEN_LATTICE: f64 = 1.1281;
-/// Rounding of regions, mm.
+/// Margin of regions for rounding, mm.
 const ROUNDING_MM: f64 = 1e-6;
 
-/// A vector that depends linearly on the logarithms of poses: of one piece, or of one against another.
+/// Vector that is linear in the logarithms of poses: of one piece, or of one relative to another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// The piece that counts as positive; `None` where it is held.
+    /// Piece that counts as positive; `None` if it is held.
     pub plus: Option<PatchId>,
-    /// The one that counts as negative; `None` where it is held.
+    /// Piece that counts as negative; `None` if it is held.
     pub minus: Option<PatchId>,
-    /// A displacement at this place, mm; else a turn, rad.
+    /// Place of a displacement, mm; `None` for a rotation, rad.
     pub at: Option<[f64; 3]>,
-    /// Directions in which it is bounded, unit vectors; the first three are orthogonal.
+    /// Directions in which the vector is bounded, unit vectors; the first three are orthogonal.
     pub axes: Vec<[f64; 3]>,
-    /// The most against each axis and along it, ≥ 0, mm or rad.
+    /// Bounds against each axis and along it, ≥ 0, mm or rad.
     pub most: Vec<[f64; 2]>,
 }
 
@@ -45,7 +45,7 @@ impl Quantity {
         }
     }
 
-    /// No vector within the bounds is longer.
+    /// Upper bound on the length of all vectors within the bounds.
     pub fn norm(&self) -> f64 {
         let longest = |[low, high]: &[f64; 2]| low.max(*high);
         let of_box = self.most[..3]
@@ -59,7 +59,7 @@ impl Quantity {
         of_box.min(BETWEEN_LATTICE * self.most.iter().map(longest).fold(0.0, f64::max))
     }
 
-    /// The most of it along `t`.
+    /// Upper bound on the component along `t`.
     fn along(&self, t: Vec3) -> f64 {
         let part = |k: usize| match Vec3::from_array(self.axes[k]).dot(t) {
             x if x > 0.0 => x * self.most[k][1],
@@ -69,13 +69,13 @@ impl Quantity {
     }
 }
 
-/// Lines of the lattice's directions.
+/// Number of lines along the lattice's directions.
 const LINES: usize = LatticeDirection::COUNT / 2;
 
-/// The coordinate axes, along which a piece's own turn and displacement are bounded.
+/// Coordinate axes, along which a piece's own rotation and displacement are bounded.
 const COORDINATES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
 
-/// The lattice's lines, but for the coordinate axes.
+/// Lines of the lattice, without the coordinate axes.
 pub(super) fn other_lines() -> impl Iterator<Item = Vec3> {
     let is_other = |d: &Vec3| COORDINATES.iter().all(|a| a.dot(*d).abs() < 0.99);
     LatticeDirection::all()
@@ -84,35 +84,35 @@ pub(super) fn other_lines() -> impl Iterator<Item = Vec3> {
         .filter(is_other)
 }
 
-/// Which quantities say how far a bearing's point goes.
+/// Quantities that determine the motion of a bearing's point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// Displacement in the bearing's cell.
+    /// Index of the displacement of the bearing's cell.
     pub cell: usize,
-    /// 1 where it counts `a` against `b`, −1 where `b` against `a`.
+    /// Sign of the cell: 1 if it counts `a` relative to `b`, −1 if `b` relative to `a`.
     cell_sign: f64,
-    /// From the cell's place to the point.
+    /// Vector from the cell's place to the point.
     off: Vec3,
-    /// Turn of one against the other, likewise.
+    /// Index of the rotation of one piece relative to the other, with its sign below.
     pub turn: usize,
     turn_sign: f64,
-    /// Turn and displacement of `a` where it is free and `b`, too.
+    /// Rotation and displacement of `a`, if both `a` and `b` are free.
     of_a: Option<[usize; 2]>,
-    /// Turn of `b` where it is free.
+    /// Rotation of `b`, if it is free.
     of_b: Option<usize>,
 }
 
 /// All quantities of some free pieces.
 pub(super) struct Quantities {
     pub all: Vec<Quantity>,
-    /// Turn and displacement of each free piece, the latter at its centre.
+    /// Rotation and displacement of each free piece, the latter at its centre.
     pub of_piece: BTreeMap<PatchId, [usize; 2]>,
-    /// One a bearing.
+    /// Places of the bearings, one for each.
     pub places: Vec<Place>,
 }
 
 impl Quantities {
-    /// Of the pieces of `free` (in ascending order) and their `bearings`.
+    /// Builds the quantities of the pieces in `free` (in ascending order) and their `bearings`.
     pub fn new(free: &[PatchId], centers: &IdVec<PatchId, Vec3>, bearings: &[Bearing]) -> Self {
         let freed = |p: PatchId| Some(p).filter(|p| free.binary_search(p).is_ok());
         let mut made = Self {
@@ -180,7 +180,7 @@ impl Quantities {
     fn place(&self, b: &Bearing, cell: usize, middle: Vec3, turn: usize) -> Place {
         let (of_a, of_b) = (self.of_piece.get(&b.a), self.of_piece.get(&b.b));
         let sign = if b.a < b.b { 1.0 } else { -1.0 };
-        // The turn of a free piece against a held one is its own, whichever it is.
+        // The rotation of a free piece relative to a held one is its own, whichever of the two it is.
         let turn_sign = match (of_a, of_b) {
             (Some(_), None) => 1.0,
             (None, Some(_)) => -1.0,
@@ -199,7 +199,7 @@ impl Quantities {
         }
     }
 
-    /// Displacement, mm, and turn, rad, of each free piece in what was `found`.
+    /// Displacement, mm, and rotation, rad, of each free piece in `found`.
     pub fn linear(&self, found: &BTreeMap<usize, Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
         let norm = |q: usize| {
             Quantity {
@@ -214,8 +214,8 @@ impl Quantities {
             .collect()
     }
 
-    /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm:
-    /// docs/notes/certificate.md.
+    /// Greatest distance of the bearing's point, seen from `b`, from the position predicted by the logarithms
+    /// of the poses, mm: docs/notes/certificate.md.
     pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {
         let norm = |k: usize| self.all[k].norm();
         let turn = norm(p.turn);
@@ -223,14 +223,14 @@ impl Quantities {
         let of_b = p.of_b.map_or(0.0, norm);
         let of_a_mm = match (p.of_a, p.of_b) {
             (Some([w, u]), _) => norm(u) + norm(w) * b.point.distance(centers[b.a]),
-            // All that moves is `b`.
+            // Only `b` moves, so `a` has no displacement.
             (None, Some(_)) => 0.0,
             (None, None) => move_mm,
         };
         0.5 * of_b * move_mm + 0.5 * turn * of_a_mm
     }
 
-    /// How far the point goes sideways, seen from `b`, where the error is so much.
+    /// Region of the point's sideways motion, seen from `b`, including the error.
     pub fn region(&self, b: &Bearing, p: &Place, error_mm: f64) -> Region {
         let (cell, turn) = (&self.all[p.cell], &self.all[p.turn]);
         let far = |t: Vec3| {

@@ -1,4 +1,4 @@
-//! Proven play against exact intersections, and pieces that come out.
+//! Tests of proven play against exact intersections, and of pieces that come out.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,8 @@ fn under_lips(lip_mm: f64, gap_mm: f64) -> Kit {
     Kit::new(brick(ALL, ALL, ALL), &[base, plate, key], &[Vec3::X; 3])
 }
 
-/// A kit's check and that of its files, whose readers number points anew, look for ways out alike.
+/// The check of a kit and that of its files search ways out alike, although readers of files renumber the
+/// points.
 #[test]
 fn a_way_out_is_sought_from_the_same_points_however_they_are_numbered() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -80,7 +81,8 @@ fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
     let Some(cube) = play.alone[PatchId(1)].filter(|p| p.is_proven) else {
         panic!("{:?}", play.alone)
     };
-    // Its centre can go 0.1 mm along each axis at once; it can turn until its edges meet the walls.
+    // The cube's centre can move 0.1 mm along each axis at once; the cube can turn until its edges meet the
+    // walls.
     let diagonal_mm = 0.1 * 3f64.sqrt();
     assert!(
         cube.translation_mm >= diagonal_mm - 1e-3 && cube.translation_mm < 1.5 * diagonal_mm,
@@ -109,7 +111,7 @@ fn faces_that_stand_back_are_a_wider_gap() {
     assert_eq!(as_is, play.estimates);
 }
 
-/// A random walk of the lid, each step with exact intersections, goes nowhere that the proof denies.
+/// A random walk of the lid, each step with exact intersections, never leaves the proven bounds.
 #[test]
 fn no_free_walk_leads_beyond_the_proven_play() {
     let kit = pinned_kit(|_| {});
@@ -193,7 +195,7 @@ fn the_play_of_all_together_is_no_less_than_that_of_each_alone() {
 
 #[test]
 fn what_nothing_holds_is_found_to_come_out() {
-    // A block in a shaft that is open above, which is not the key.
+    // A block, not the key, in a shaft that is open above.
     let (shaft, wide) = ([10.0, 20.0], [9.9, 20.1]);
     let base = brick(ALL, ALL, ALL).subtract(&brick(wide, wide, [19.9, 40.0]));
     let pieces = [
@@ -237,7 +239,7 @@ fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not()
         "{:?}",
         held.alone
     );
-    // Shifted under one lip by 0.4 mm it is free of the other, which reaches over it by 0.3.
+    // Shifted under one lip by 0.4 mm, the plate is free of the other, which reaches over it by 0.3.
     let loose = measured(&under_lips(0.3, 0.4), 0.4);
     assert!(
         !loose.alone[PatchId(1)].is_some_and(|p| p.is_proven),
@@ -249,7 +251,7 @@ fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not()
 #[test]
 fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
     let key = brick([60.0, 61.0], ALL, ALL);
-    // Open in front alone; a drawer of 16 mm that must be pulled all its way.
+    // Open only in front; a drawer of 16 mm that must be pulled all the way out.
     let cabinet = brick(ALL, ALL, ALL).subtract(&brick([10.0, 40.0], [9.9, 20.1], [9.9, 20.1]));
     let drawer = brick([14.0, 30.0], [10.0, 20.0], [10.0, 20.0]);
     let kit = Kit::new(
@@ -263,7 +265,7 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
         "{:?}",
         play.alone
     );
-    // Nothing ends the ball's turns; still it is where it was.
+    // Nothing ends the ball's rotations; still the ball stays in its place.
     let ball = |radius_mm: f64| {
         let sphere = shellock_testkit::shapes::sphere(3, Vec3::splat(radius_mm));
         Volume::from_closed_mesh(&sphere)
@@ -282,7 +284,7 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
 
 #[test]
 fn a_speck_is_no_bearing() {
-    // The cube touches its cage on a needle alone: 0.05 mm wide, on one side.
+    // The cube touches its cage only on a needle: 0.05 mm wide, on one side.
     let hollow = [9.0, 21.0];
     let cage = brick(ALL, ALL, ALL).subtract(&brick(hollow, hollow, hollow));
     let needle = brick([19.9, 20.95], [15.0, 15.05], [15.0, 15.05]);

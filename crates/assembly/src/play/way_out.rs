@@ -1,15 +1,14 @@
-//! A guided search for a way to take a piece out by hand, where it is not proven that there is none.
+//! Guided search for a way to take a piece out by hand, if the absence of one is not proven.
 //!
-//! From rest the piece goes by small steps. At each pose the points near its joints ask for the nearest
-//! surface of the other side, which gives a linear limit on the next step, and a linear program finds the
-//! step that carries on best in some direction. *Walks* begin with the motions of the widest play and carry
-//! on as they went, which finds open shafts. Then a *tree* of poses is grown towards random poses, each from
-//! the nearest one that was reached [LaValle1998], which also finds ways that go forth and back: shifted
-//! under one lip, tilted past the other. From each pose that is farther than all before a walk carries on.
-//! Only a walk that gets out is looked at exactly: at every pose the piece must share no volume with the
-//! others.
+//! The piece moves from rest by small steps. At each pose, the points near its joints look up the nearest
+//! surface of the other side, which limits the next step linearly. A linear program finds the step that goes
+//! farthest in some direction. *Walks* begin with the motions of the widest play and continue in their
+//! direction, which finds open shafts. Then a *tree* of poses grows towards random poses, each from the
+//! nearest pose reached so far [LaValle1998]. It also finds ways that go back and forth: shifted under one
+//! lip, tilted past the other. A walk starts from each pose that is farther than all before. Only a walk that
+//! gets out is checked exactly: at every pose the piece must share no volume with the others.
 //!
-//! Limits: that no way is found proves nothing. Other pieces rest.
+//! Limits: finding no way proves nothing. Other pieces rest.
 
 use std::sync::OnceLock;
 
@@ -25,58 +24,59 @@ use crate::motion::{Contact, Corner, Freedom, Limits, System};
 use crate::verify::sample;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// What of a piece is so near to others is its joint, mm.
+/// Distance to other pieces within which a point belongs to the piece's joint, mm.
 const JOINT_MM: f64 = 2.5;
-/// Distance of neighbouring points of joints, mm.
+/// Distance between neighbouring points of joints, mm.
 const SPACING_MM: f64 = 1.0;
-/// Most samples of one piece, of which those beside others count.
+/// Greatest number of samples of one piece; only those beside others are used.
 const MOST_SAMPLES: f64 = 1e6;
-/// Most points of either side.
+/// Greatest number of points on either side.
 const MOST_POINTS: usize = 700;
-/// Faces farther off limit no step, mm.
+/// Distance beyond which faces do not limit a step, mm.
 const REACH_MM: f64 = 0.6;
-/// A joint that was moved so far in the mean is out, mm.
+/// Mean displacement of a joint from which the piece is out, mm.
 const OUT_MM: f64 = 12.0;
-/// How far faces give way, mm: rims are some µm apart, and rough. With the first, wide faces share no volume
-/// that counts.
+/// Distances by which faces may give way, mm: rims are some µm apart, and rough. With the first, wide faces
+/// share no relevant volume.
 const GIVE_MM: [f64; 2] = [0.001, 0.01];
-/// What is kept of wider gaps, mm, for what lies between points.
+/// Gap that is kept to surfaces where gaps are wider, mm, for features between points.
 const KEPT_MM: f64 = 0.04;
-/// No point of the joint moves farther in a step, mm: thinner things than pins could be jumped.
+/// Greatest motion of a point of the joint in a step, mm; larger steps could jump over features thinner than
+/// pins.
 const STEP_MM: f64 = 0.15;
-/// A step by less gets nowhere, mm.
+/// Least step that counts as progress, mm.
 const LEAST_STEP_MM: f64 = 0.01;
-/// Steps of one walk, and steps without coming farther before it ends.
+/// Greatest number of steps of a walk, and of steps without progress before it ends.
 const MOST_STEPS: usize = 400;
 const MOST_STUCK: usize = 12;
-/// Share of chance in the direction of a step that got on, and of one that did not: a walk along a wall must
-/// find the way round its end.
+/// Random share of a step's direction, after progress and without: a walk along a wall must find the way
+/// round its end.
 const CHANCE: [f64; 2] = [0.1, 0.8];
-/// Common volume of two pieces that they give way, mm³, on top of that at rest.
+/// Common volume of two pieces that counts as none, mm³, beyond that at rest.
 const SHARED_MM3: f64 = 0.05;
-/// The same as a share of the piece, where that is less.
+/// Common volume that counts as none, as a share of the piece, if that is less.
 const SHARED: f64 = 1e-4;
-/// Shifts and turns.
+/// Number of translations and rotations.
 const WAYS: usize = 6;
-/// Poses of a tree, for a piece that small motions hold well and for one that they do not.
+/// Greatest number of poses of a tree, for a piece with little play and for one with much.
 const MOST_NODES: [usize; 2] = [150, 700];
-/// Small motions that go farther, as multiples of the clearance and in rad for a mm of it, do not hold a
-/// piece well.
+/// Play of small motions above which a piece has much play, as multiples of the clearance, and in rad per mm
+/// of it.
 const LOOSE: [f64; 2] = [4.0, 0.25];
-/// Steps towards one target.
+/// Number of steps towards one target.
 const MOST_ON: usize = 8;
-/// Share of the targets that are only turned or shifted on from the farthest pose.
+/// Share of targets that only rotate or shift the farthest pose further.
 const ONWARDS: f64 = 0.5;
-/// Targets are up to so many times as far as the farthest pose, and so much, mm.
+/// Distance of targets, as a multiple of that of the farthest pose, plus a constant, mm.
 const BEYOND: f64 = 1.3;
 const BEYOND_MM: f64 = 0.5;
-/// A pose must be so much farther than the one that the last walk carried on from, as a multiple and mm.
+/// Progress needed for a new walk beyond the pose where the last one started, as a multiple and in mm.
 const FARTHER: f64 = 1.5;
 const FARTHER_MM: f64 = 0.4;
-/// Poses of a way that are kept.
+/// Number of poses of a way that are kept.
 const KEPT_POSES: usize = 60;
 
-/// Where a piece is: turned about a centre, then shifted.
+/// Pose of a piece: rotated about a centre, then shifted.
 #[derive(Clone, Copy)]
 struct Pose {
     turn: Quat,
@@ -104,11 +104,11 @@ impl Pose {
     }
 }
 
-/// Poses that were reached.
+/// Tree of poses that were reached.
 struct Tree {
-    /// Each with the one that it was reached from.
+    /// Poses, each with the node from which it was reached.
     nodes: Vec<(Pose, usize)>,
-    /// The one whose joint is farthest from its place, and how far, mm.
+    /// Node whose joint is farthest from its place, and below that distance, mm.
     farthest: usize,
     farthest_mm: f64,
 }
@@ -123,7 +123,7 @@ impl Tree {
         last
     }
 
-    /// The node nearest to a displacement and turn, which counts by the radius.
+    /// Node nearest to a displacement and a rotation, which is weighted by the radius.
     fn nearest(&self, target: (Vec3, Vec3), radius_mm: f64) -> usize {
         let far = |(pose, _): &(Pose, usize)| {
             let turn = (pose.turn.to_scaled_axis() - target.1) * radius_mm;
@@ -135,7 +135,7 @@ impl Tree {
             .unwrap_or(0)
     }
 
-    /// The poses from rest to that of `last`.
+    /// Poses from rest to that of `last`.
     fn path(&self, last: usize) -> Vec<Pose> {
         let mut on_way = vec![last];
         while let Some(&node) = on_way.last().filter(|node| **node != 0) {
@@ -145,16 +145,16 @@ impl Tree {
     }
 }
 
-/// A piece that is to be taken out past all others.
+/// Search for a way to take one piece out past all others.
 pub(super) struct Walk<'a> {
     surfaces: &'a Surfaces,
     piece: PatchId,
     center: Vec3,
     clearance_mm: f64,
     give_mm: f64,
-    /// The others, and the volume of the piece, mm³, once they are needed; nothing where one is no volume.
+    /// Other pieces, and the volume of this one, mm³, computed on demand; `None` if one bounds no volume.
     solids: OnceLock<Option<(Vec<Volume>, f64)>>,
-    /// Points of the piece's joint, and points of others beside it with their pieces.
+    /// Points of the piece's joint, and below points of other pieces beside it.
     own: Vec<Vec3>,
     others: Vec<Vec3>,
 }
@@ -167,7 +167,7 @@ impl<'a> Walk<'a> {
             let samples = sample::on_surface(mesh, n.max(1), u64::from(a.0))
                 .into_iter()
                 .map(|s| s.point);
-            // Corners are what meets others first.
+            // Corners are the first to meet other pieces.
             let points = thinned(as_met(mesh)).into_iter().chain(samples);
             let is_near = |p: &Vec3| surfaces.nearest(*p, JOINT_MM, b).is_some();
             points.filter(is_near).collect()
@@ -187,8 +187,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The poses of a way out, from rest; `None` where none was found. Walks begin with `swings`:
-    /// displacement of the centre, mm, and turn, rad.
+    /// Searches for the poses of a way out, from rest; `None` if none was found. Walks begin with `swings`:
+    /// displacement of the centre, mm, and rotation, rad.
     pub fn find(
         mut self,
         ctx: &Ctx,
@@ -198,7 +198,7 @@ impl<'a> Walk<'a> {
         if self.own.is_empty() {
             return Ok(None);
         }
-        // Along and about the axes where nothing ends a small motion.
+        // Without swings nothing limits small motions: start along and about the axes.
         let axes =
             (0..2 * WAYS).map(|i| std::array::from_fn(|k| if k == i / 2 { [1.0, -1.0][i % 2] } else { 0.0 }));
         let axes = axes.filter(|_| swings.is_empty());
@@ -225,7 +225,7 @@ impl<'a> Walk<'a> {
         )
     }
 
-    /// The poses of a way out that a tree of poses leads to.
+    /// Searches for the poses of a way out with a tree of poses.
     fn tree(
         &self,
         ctx: &Ctx,
@@ -279,7 +279,7 @@ impl<'a> Walk<'a> {
         Ok(None)
     }
 
-    /// The pose a step on.
+    /// Pose after one step, or `None` without progress.
     fn moved(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<Pose> {
         let (shift, spin) = self.step(pose, heading)?;
         let turn = Quat::from_scaled_axis(spin);
@@ -289,7 +289,7 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// All poses of a walk that carries on from the last of `poses` and gets out.
+    /// Poses of a walk that starts from the last of `poses` and gets out; `None` if it does not.
     fn walk(
         &self,
         ctx: &Ctx,
@@ -329,7 +329,7 @@ impl<'a> Walk<'a> {
         Ok(None)
     }
 
-    /// The direction, made as long for shifts as for turns, with chance.
+    /// Adds a random part to the direction, scaled equally for translations and rotations.
     fn with_chance(&self, heading: (Vec3, Vec3), chance: f64, rng: &mut ChaCha8Rng) -> (Vec3, Vec3) {
         let radius_mm = self.radius_mm();
         let length = (heading.0.length_squared() + (heading.1 * radius_mm).length_squared())
@@ -342,7 +342,7 @@ impl<'a> Walk<'a> {
         )
     }
 
-    /// The joint's farthest point is so far from the centre, mm.
+    /// Distance of the joint's farthest point from the centre, mm.
     fn radius_mm(&self) -> f64 {
         self.own
             .iter()
@@ -350,7 +350,7 @@ impl<'a> Walk<'a> {
             .fold(1.0, f64::max)
     }
 
-    /// How far the joint is from its place in the mean, mm.
+    /// Mean displacement of the joint's points, mm.
     fn moved_mm(&self, pose: &Pose) -> f64 {
         self.own
             .iter()
@@ -359,7 +359,8 @@ impl<'a> Walk<'a> {
             / self.own.len() as f64
     }
 
-    /// Whether a quarter of the joint is away from the others: what only spins in its place is not out.
+    /// Returns true if a quarter of the joint is away from the others: a piece that only spins in its place
+    /// is not out.
     fn is_apart(&self, pose: &Pose) -> bool {
         let is_near = |p: &&Vec3| {
             self.surfaces
@@ -369,7 +370,7 @@ impl<'a> Walk<'a> {
         4 * self.own.iter().filter(is_near).count() < 3 * self.own.len()
     }
 
-    /// The small motion that carries the joint's points on as they went so far: the sum of their ways, and
+    /// Small motion that continues the displacement of the joint's points: the sum of their directions, and
     /// its moment.
     fn heading(&self, pose: &Pose) -> (Vec3, Vec3) {
         let at = self.center + pose.shift;
@@ -383,7 +384,8 @@ impl<'a> Walk<'a> {
             .iter()
             .map(way)
             .fold((Vec3::ZERO, Vec3::ZERO), |s, w| (s.0 + w.0, s.1 + w.1));
-        // As far as a unit force and its moment would go: moments count by the square of the joint's size.
+        // Scaled as a unit force and its moment would act: moments are divided by the square of the joint's
+        // size.
         let n = self.own.len() as f64;
         let size_sq = self
             .own
@@ -394,7 +396,7 @@ impl<'a> Walk<'a> {
         (sum.0 / n, sum.1 / (n * size_sq.max(1.0)))
     }
 
-    /// The step that goes farthest along `heading`: displacement of the centre and turn about it.
+    /// Step that goes farthest along `heading`: displacement of the centre and rotation about it.
     fn step(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<(Vec3, Vec3)> {
         let at = self.center + pose.shift;
         let radius_mm = self.radius_mm();
@@ -431,7 +433,7 @@ impl<'a> Walk<'a> {
         (shift.length() + spin.length() * radius_mm > LEAST_STEP_MM).then_some((shift, spin))
     }
 
-    /// What the surfaces around leave to the next step; points are from `at`.
+    /// Limits of the next step by the surfaces around; points are relative to `at`.
     fn limits(&self, pose: &Pose, at: Vec3) -> Vec<Contact> {
         let is_other = |b: PatchId| b != self.piece;
         let of_own = |p: &Vec3| {
@@ -453,7 +455,7 @@ impl<'a> Walk<'a> {
             .collect()
     }
 
-    /// Whether the piece shares no more with any of the others at any pose than at rest.
+    /// Returns true if at no pose the piece shares more volume with any other piece than at rest.
     fn is_free(
         &self,
         ctx: &Ctx,
@@ -474,7 +476,7 @@ impl<'a> Walk<'a> {
             return Ok(false);
         };
         let most_mm3 = SHARED_MM3.min(SHARED * own_mm3);
-        // With each of the others; nothing where the piece is no volume any more.
+        // Common volume with each other piece; `None` if the moved piece bounds no volume.
         let shared_mm3 = |pose: &Pose| -> Option<Vec<f64>> {
             let mut mesh = pieces[self.piece].clone();
             mesh.points
@@ -513,7 +515,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Some of the poses, the last among them, as they are written.
+/// Subset of the poses, including the last, each as displacement and rotation vector.
 fn kept(poses: &[Pose]) -> Vec<[f64; 6]> {
     let every = poses.len().div_ceil(KEPT_POSES).max(1);
     poses
@@ -524,13 +526,14 @@ fn kept(poses: &[Pose]) -> Vec<[f64; 6]> {
         .collect()
 }
 
-/// The direction from the nearest place of a surface to a point, and how far it may come nearer, mm: beside
-/// an edge the point may pass it. Where it touches or is inside, the triangle's normal.
+/// Direction from the nearest place of a surface to a point, and the distance by which the point may
+/// approach, mm. Beside an edge, the point may pass it. If the point touches the surface or is inside, the
+/// direction is the triangle's normal.
 fn apart(p: Vec3, near: Vec3, normal: Vec3, give_mm: f64) -> (Vec3, f64) {
-    /// Less is touching, mm.
+    /// Distance below which the point touches the surface, mm.
     const TOUCHING_MM: f64 = 5e-4;
-    /// No step leads so far in, mm: what is farther from the surface is outside, whatever the normal beside
-    /// an edge says.
+    /// Greatest depth that a step can reach, mm. A point farther from the surface is outside, whatever the
+    /// normal beside an edge indicates.
     const DEEPEST_MM: f64 = 2.0 * GIVE_MM[1];
     let away = p - near;
     let gap_mm = away.length();
@@ -552,7 +555,7 @@ fn limit(point: Vec3, normal: Vec3, gap_mm: f64) -> Contact {
     }
 }
 
-/// No point so far from the centre moves by more than a step.
+/// Limits the motion of points at this radius from the centre to one step.
 fn bounds(radius_mm: f64) -> impl Iterator<Item = Contact> {
     const WAYS: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
     let at = move |arm: Vec3| {
@@ -562,8 +565,8 @@ fn bounds(radius_mm: f64) -> impl Iterator<Item = Contact> {
     WAYS.into_iter().chain([Vec3::ZERO]).flat_map(at)
 }
 
-/// The points of a mesh as its triangles come to them: the same however they are numbered, as they are anew by readers of
-/// files.
+/// Points of a mesh in the order in which its triangles use them. This order does not depend on the numbering
+/// of points, which readers of files change.
 pub(super) fn as_met(mesh: &TriMesh) -> Vec<Vec3> {
     let mut is_new = vec![true; mesh.points.len()];
     let corners = mesh.triangles.iter().flatten().map(|&v| v as usize);
@@ -571,7 +574,7 @@ pub(super) fn as_met(mesh: &TriMesh) -> Vec<Vec3> {
     first.map(|v| mesh.points[v]).collect()
 }
 
-/// Every k-th of too many points.
+/// Keeps every k-th point if there are too many.
 fn thinned(points: Vec<Vec3>) -> Vec<Vec3> {
     let every = points.len().div_ceil(MOST_POINTS).max(1);
     points.into_iter().step_by(every).collect()

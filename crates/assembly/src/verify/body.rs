@@ -1,4 +1,4 @@
-//! Whether each piece is one printable solid.
+//! Checks that each piece is one printable solid.
 
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3, Volume};
@@ -6,28 +6,28 @@ use shellock_geom::{TriMesh, Vec3, Volume};
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Points nearer than this become one, mm: what readers of STL files do. At the size of prints it merges
+/// Distance below which points are merged, mm, as readers of STL files do. At the size of prints it merges
 /// bitwise equal single-precision points and, near the origin, a few more.
 const MERGE_MM: f64 = 1e-8;
-/// A component of less volume is a crumb that no slicer prints, mm³. Cavities come out negative and are no
-/// bodies.
+/// Volume below which a component is a crumb that no slicer prints, mm³. Cavities have a negative volume and
+/// do not count as bodies.
 const CRUMB_MM3: f64 = 0.01;
 
-/// A piece as a reader of its file sees it.
+/// Piece as a reader of its file sees it.
 pub struct Body {
-    /// Equal points merged, collapsed triangles dropped.
+    /// Mesh with equal points merged and collapsed triangles dropped.
     pub mesh: TriMesh,
-    /// The region inside; `None` where the mesh bounds none.
+    /// Region inside the mesh; `None` if it bounds none.
     pub volume: Option<Volume>,
-    /// What is wrong with it.
+    /// Defects found in the mesh.
     defects: Vec<Finding>,
 }
 
-/// What a sorted list of edges says about a mesh.
+/// Summary of the edges of a mesh.
 struct EdgeUse {
-    /// Edges used more often one way than the other.
+    /// Number of edges used more often in one direction than in the other.
     n_unbalanced: usize,
-    /// Edges of more than two triangles, and the middle of the first one.
+    /// Number of edges of more than two triangles, and the midpoint of the first one.
     shared: Option<(usize, Vec3)>,
 }
 
@@ -44,7 +44,7 @@ pub fn read(ctx: &Ctx, pieces: &IdVec<PatchId, TriMesh>) -> Result<IdVec<PatchId
         .collect())
 }
 
-/// The verdict over all pieces.
+/// Checks over all pieces, with their findings.
 pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
     let findings: Vec<Finding> = bodies
         .iter()
@@ -105,7 +105,7 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     }
 }
 
-/// `mesh`, unless it names points that are not there or are not numbers.
+/// Returns `mesh`, unless it refers to points that do not exist, or has coordinates that are not finite.
 pub fn finite(mesh: &TriMesh) -> Option<&TriMesh> {
     let is_sound = mesh.points.iter().all(|p| p.is_finite())
         && mesh
@@ -116,8 +116,7 @@ pub fn finite(mesh: &TriMesh) -> Option<&TriMesh> {
     is_sound.then_some(mesh)
 }
 
-/// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first
-/// order.
+/// Merges equal points of `mesh`, and drops triangles that collapse. Points keep their original order.
 pub fn merged(mesh: &TriMesh) -> TriMesh {
     let cell = |p: Vec3| {
         p.to_array()

@@ -1,9 +1,9 @@
-//! How far the finished pieces stay apart: each pair at rest, and each path over all of its travels. Nothing
-//! is sampled.
+//! Gaps between the finished pieces: each pair at rest, and each path over its whole travel. No sampling is
+//! involved.
 //!
-//! The outer rims of a seam's two sides are meant to meet, and may rub by some µm: that only shows. So each
-//! gap is asked twice, of everything and of what lies beneath the rim. The pieces are cut at the rim's depth
-//! for that, along lines that are straight on each triangle.
+//! The outer rims on both sides of a seam are meant to meet, and may rub by some µm, which is visible but
+//! harmless. So each gap is computed twice: for whole surfaces and for the part beneath the rim. For that,
+//! the pieces are cut at the rim's depth along lines that are straight on each triangle.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,61 +16,61 @@ use super::body::{finite, merged};
 use crate::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Wider gaps are of no interest, mm: the widest clearance is 1 mm.
+/// Greatest gap that is computed, mm: the widest clearance is 1 mm.
 const WITHIN_MM: f64 = 1.0;
 
-/// Finished pieces, prepared for questions of clearance; `None` where a mesh bounds no volume.
+/// Finished pieces, prepared for clearance queries; `None` for a mesh that bounds no volume.
 pub struct PieceShapes(IdVec<PatchId, Option<Shape>>);
 
-/// The least gap of two pieces and where it is.
+/// Least gap of two pieces, and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearestPlace {
-    /// Least distance, mm, to 0.1 µm; minus the depth where surfaces cross, as [`shellock_geom::clearance`]
-    /// defines it.
+    /// Least distance, mm, to 0.1 µm; where surfaces cross, minus the depth as defined in
+    /// [`shellock_geom::clearance`].
     pub gap_mm: f64,
-    /// Travel of the moving piece there, mm; 0 at rest.
+    /// Travel of the moving piece at this gap, mm; 0 at rest.
     pub travel_mm: f64,
-    /// Midway between the surfaces, mm in assembly space.
+    /// Point midway between the surfaces, mm in assembly space.
     pub at: [f64; 3],
 }
 
-/// How near two pieces come in the assembly.
+/// Least gaps between two pieces at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PairGap {
-    /// The piece with the lower id.
+    /// Piece with the lower id.
     pub a: PatchId,
-    /// The other.
+    /// Piece with the higher id.
     pub b: PatchId,
-    /// Of their whole surfaces.
+    /// Least gap of their whole surfaces.
     pub overall: NearestPlace,
-    /// Of what lies beneath the rim, if that comes within 1 mm.
+    /// Least gap beneath the rim, if it is within 1 mm.
     pub beneath_rim: Option<NearestPlace>,
 }
 
-/// How near a piece comes to one installed before it, over its whole way out.
+/// Least gaps between a piece and one installed before it, over its whole way out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathGap {
-    /// The piece that moves.
+    /// Piece that moves along its way.
     pub piece: PatchId,
-    /// The earlier piece.
+    /// Piece that was installed earlier.
     pub against: PatchId,
-    /// Of their whole surfaces.
+    /// Least gap of their whole surfaces.
     pub overall: NearestPlace,
-    /// Of what lies beneath the rim, if that comes within 1 mm.
+    /// Least gap beneath the rim, if it is within 1 mm.
     pub beneath_rim: Option<NearestPlace>,
 }
 
 /// All gaps of a kit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KitGaps {
-    /// At rest, see [`pair_gaps`].
+    /// Gaps at rest, see [`pair_gaps`].
     pub pairs: Vec<PairGap>,
-    /// On the way, see [`path_gaps`].
+    /// Gaps along the ways, see [`path_gaps`].
     pub paths: Vec<PathGap>,
 }
 
-/// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the
-/// model's surface is rim; nothing is where there is no model.
+/// Computes all gaps of the finished `pieces` of `model`, installed by `plan`. Everything within `rim_mm` of
+/// the model's surface is rim; without a model, nothing is.
 pub fn kit_gaps(
     ctx: &Ctx,
     model: Option<&Solid>,
@@ -87,7 +87,8 @@ pub fn kit_gaps(
     })
 }
 
-/// Prepares `pieces` of `model`. What is within `rim_mm` of the model's surface is rim.
+/// Prepares `pieces` of `model` for clearance queries. Everything within `rim_mm` of the model's surface is
+/// rim.
 pub fn prepare(
     ctx: &Ctx,
     model: Option<&Solid>,
@@ -107,7 +108,7 @@ pub fn prepare(
     ))
 }
 
-/// Every pair of pieces that comes within 1 mm, in order of their ids.
+/// Gaps of every pair of pieces that comes within 1 mm, in order of their ids.
 pub fn pair_gaps(ctx: &Ctx, shapes: &PieceShapes) -> Result<Vec<PairGap>, Cancelled> {
     let ids: Vec<PatchId> = shapes.0.ids().collect();
     let pairs = ids
@@ -128,8 +129,8 @@ pub fn pair_gaps(ctx: &Ctx, shapes: &PieceShapes) -> Result<Vec<PairGap>, Cancel
     })
 }
 
-/// Every path of `plan`, against each earlier piece that it comes within 1 mm of, in order of installation.
-/// What the plan names and is not there is left out.
+/// Gaps of every path of `plan` to each earlier piece that it comes within 1 mm of, in order of installation.
+/// Pieces of the plan that do not exist are left out.
 pub fn path_gaps(
     ctx: &Ctx,
     shapes: &PieceShapes,
@@ -159,7 +160,7 @@ pub fn path_gaps(
     })
 }
 
-/// What `ask` answers for each of `pairs`, in their order.
+/// Answers of `ask` for each of `pairs`, in their order.
 fn among<P: Send, G: Send>(
     ctx: &Ctx,
     pairs: Vec<P>,
@@ -204,7 +205,7 @@ mod tests {
     use shellock_geom::{Vec3, Volume};
     use shellock_testkit::shapes::cuboid;
 
-    /// A block that lies in a tray, flush with its rim, and touches the walls there alone. It leaves upwards.
+    /// A block that lies in a tray, flush with its rim, and touches only the walls there. It leaves upwards.
     fn kit() -> (Solid, IdVec<PatchId, TriMesh>, InstallationPlan) {
         let model = cuboid([0.0; 3], [20.0, 20.0, 10.0]);
         let seat = cuboid([5.0, 5.0, 4.0], [15.0, 15.0, 11.0]);
@@ -259,7 +260,7 @@ mod tests {
             .iter()
             .find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2)))
             .unwrap();
-        // The collar runs into the ledge by 0.08 mm on its way, the block beneath it by 0.03.
+        // The collar hits the ledge by 0.08 mm on its way, the block beneath it by 0.03.
         assert!((met.overall.gap_mm + 0.08).abs() < 2e-4, "{met:?}");
         assert!((2.0..3.2).contains(&met.overall.travel_mm), "{met:?}");
     }

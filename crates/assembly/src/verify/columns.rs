@@ -1,14 +1,14 @@
-//! Solids as the stretches in which parallel rays run inside them.
+//! Solids as the intervals in which parallel rays run inside them.
 //!
-//! A pixel grid lies across a ray direction `s`; through the centre of each pixel goes one ray, and a solid
-//! becomes a sorted list of intervals on each ray. Volumes of intersections under any translation along `s`
-//! then are sums of interval overlaps. The rows of the grid are turned so that they run along no axis: walls
-//! parallel to the rays are met in proportion to their area instead of all or not at all.
+//! A pixel grid lies across a ray direction `s`. One ray goes through the centre of each pixel, and a solid
+//! becomes a sorted list of intervals on each ray. So volumes of intersections under any translation along
+//! `s` are sums of interval overlaps. The rows of the grid are rotated so that they run along no axis. Then
+//! walls parallel to the rays are hit in proportion to their area, instead of all or not at all.
 
 use shellock_geom::{Aabb, Vec3};
 
-/// By how much pixel rows are turned about the rays, rad. Its tangent is no small fraction, so rows, columns
-/// and their diagonals are parallel to no wall of an axis-aligned model.
+/// Rotation of the pixel rows about the rays, rad. Its tangent is no small fraction, so rows, columns and
+/// their diagonals are parallel to no wall of an axis-aligned model.
 const ROW_ANGLE_RAD: f64 = 0.417;
 
 /// Axes of a pixel grid: `u` and `v` across the rays, `s` along them; right-handed.
@@ -20,7 +20,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Rays along the unit vector `s`.
+    /// Frame with rays along the unit vector `s`.
     pub fn along(s: Vec3) -> Self {
         let (a, b) = s.any_orthonormal_pair();
         let u = a * ROW_ANGLE_RAD.cos() + b * ROW_ANGLE_RAD.sin();
@@ -42,7 +42,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Covers the shadow of `bounds`, a box in frame coordinates.
+    /// Grid that covers the shadow of `bounds`, a box in frame coordinates.
     pub fn covering(bounds: Aabb, pixel_mm: f64) -> Self {
         let size = bounds.size();
         let count = |length: f64| (length / pixel_mm).ceil() as usize + 1;
@@ -53,7 +53,7 @@ impl Grid {
         }
     }
 
-    /// Area that one ray stands for, mm².
+    /// Area that one ray represents, mm².
     pub fn cell_mm2(&self) -> f64 {
         self.pixel_mm * self.pixel_mm
     }
@@ -62,7 +62,7 @@ impl Grid {
         self.n[0] * self.n[1]
     }
 
-    /// Pixels along `axis` whose centres lie in [low, high] mm, as a half-open range.
+    /// Half-open range of the pixels along `axis` whose centres lie in [low, high] mm.
     fn range(&self, axis: usize, low: f64, high: f64) -> std::ops::Range<usize> {
         let first = ((low - self.origin[axis]) / self.pixel_mm - 0.5).ceil().max(0.0);
         let last = ((high - self.origin[axis]) / self.pixel_mm - 0.5).floor() + 1.0;
@@ -74,13 +74,13 @@ impl Grid {
     }
 }
 
-/// For every ray of a grid the depth intervals inside a solid, mm, in order of depth.
+/// Depth intervals inside a solid, mm, for every ray of a grid, in order of depth.
 pub struct Columns {
     starts: Vec<u32>,
     intervals: Vec<[f64; 2]>,
 }
 
-/// Where a ray crosses a surface.
+/// Crossing of a ray with a surface.
 #[derive(Clone, Copy)]
 struct Hit {
     pixel: u32,
@@ -91,7 +91,7 @@ struct Hit {
 impl Columns {
     /// Cuts the closed mesh with `points` (frame coordinates, moved by `shift`) into intervals.
     ///
-    /// A ray that meets an odd number of faces, which only rounding can make, loses its unpaired end.
+    /// A ray that meets an odd number of faces, which can only be due to rounding, loses its unpaired end.
     pub fn of(grid: &Grid, points: &[Vec3], triangles: &[[u32; 3]], shift: Vec3) -> Self {
         let mut hits = Vec::new();
         for t in triangles {
@@ -105,19 +105,20 @@ impl Columns {
         &self.intervals[self.starts[pixel] as usize..self.starts[pixel + 1] as usize]
     }
 
-    /// How many rays there are.
+    /// Number of rays in the grid.
     pub fn n_rays(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Length common to both, summed over all rays, mm; times the cell's area it is the common volume.
+    /// Length common to both, summed over all rays, mm. Multiplied by the cell's area, it is the common
+    /// volume.
     pub fn common_length_mm(&self, other: &Self) -> f64 {
         (0..self.n_rays())
             .map(|ray| common_mm(self.on_ray(ray), other.on_ray(ray)))
             .sum()
     }
 
-    /// Total length inside, mm.
+    /// Total length inside the solid, mm.
     pub fn length_mm(&self) -> f64 {
         self.intervals.iter().map(|[from, to]| to - from).sum()
     }
@@ -154,7 +155,7 @@ fn common_mm(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
         .sum()
 }
 
-/// Turns the crossings of one ray into intervals.
+/// Pairs the crossings of one ray to intervals.
 fn pair_up(crossings: &mut [(f64, bool)], intervals: &mut Vec<[f64; 2]>) {
     crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let (mut inside, mut from) = (0u32, 0.0);
@@ -172,8 +173,8 @@ fn pair_up(crossings: &mut [(f64, bool)], intervals: &mut Vec<[f64; 2]>) {
     }
 }
 
-/// Whether `c` lies left of the line from `p` to `q`; for `q`, `p` exactly the contrary, so that a ray meets
-/// exactly one of two triangles that share an edge.
+/// Returns true if `c` lies left of the line from `p` to `q`. Swapping `p` and `q` gives exactly the
+/// opposite, so a ray meets exactly one of two triangles that share an edge.
 fn is_left(p: Vec3, q: Vec3, [x, y]: [f64; 2]) -> bool {
     let turn = |p: Vec3, q: Vec3| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
     if (p.x, p.y) < (q.x, q.y) {
@@ -194,7 +195,7 @@ fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
     if columns.is_empty() {
         return;
     }
-    // Seen along the rays a face that turns left looks away from the viewer: there the ray leaves.
+    // Along the rays, a face that turns left faces away from the viewer: there the ray leaves.
     let leaves = area_doubled > 0.0;
     let slope_u = (ab.z * ac.y - ac.z * ab.y) / area_doubled;
     let slope_v = (ac.z * ab.x - ab.z * ac.x) / area_doubled;
@@ -204,7 +205,7 @@ fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
             let x = grid.center(0, column);
             let at = [x, y];
             if is_left(a, b, at) == leaves && is_left(b, c, at) == leaves && is_left(c, a, at) == leaves {
-                // Faces almost parallel to the ray have steep slopes; the corners bound the answer.
+                // Faces almost parallel to the ray have steep slopes; the corners bound the depth.
                 let depth = (a.z + slope_u * (x - a.x) + slope_v * (y - a.y)).clamp(low.z, high.z);
                 hits.push(Hit {
                     pixel: (row * grid.n[0] + column) as u32,

@@ -1,4 +1,4 @@
-//! Where the finished pieces face each other closely enough to hold each other.
+//! Contacts: places where the finished pieces face each other closely enough to hold each other.
 
 use rayon::prelude::*;
 use shellock_geom::Aabb;
@@ -11,16 +11,16 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Distance between neighbouring samples, mm: several on every side of a 2 mm connector.
 const SPACING_MM: f64 = 0.7;
-/// Least and most samples on one piece.
+/// Least and greatest number of samples on one piece.
 const N_SAMPLES: (f64, f64) = (2_000.0, 60_000.0);
-/// What may come on top of the clearance between faces that still count as touching, mm: a printer's error.
+/// Greatest distance beyond the clearance between faces that still count as touching, mm: a printer's error.
 pub const REACH_MM: f64 = 0.15;
-/// Faces whose normals have a greater dot product do not face each other (26° from opposite).
+/// Greatest dot product of the normals of two faces that face each other (26° from opposite).
 const FACING: f64 = -0.9;
-/// Most contacts that are kept; every k-th of a longer list.
+/// Greatest number of contacts that are kept; every k-th of a longer list.
 const MOST_CONTACTS: usize = 20_000;
 
-/// All contacts, in order of `a`, then along its surface, then of `b`.
+/// Finds all contacts, in order of `a`, then along its surface, then of `b`.
 pub fn find(
     ctx: &Ctx,
     bodies: &IdVec<PatchId, Body>,

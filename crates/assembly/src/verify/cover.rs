@@ -1,4 +1,4 @@
-//! Whether the pieces together still show the model's outer surface.
+//! Checks that the pieces together still show the model's outer surface.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -9,9 +9,9 @@ use super::limits::{LEAST_KEPT, WIDEST_HALF_GAP_MM};
 use super::{Check, Finding, sample};
 use crate::{IdVec, PatchId};
 
-/// Points tried. The share of lost surface is known to 0.1 % (one sigma at the limit).
+/// Number of sample points. The share of lost surface is known to 0.1 % (one sigma at the limit).
 const N_SAMPLES: usize = 20_000;
-/// A point of the model counts as kept where a piece is nearer than this, mm.
+/// Distance to a piece below which a point of the model counts as kept, mm.
 const KEPT_MM: f64 = 0.02;
 
 /// Samples the model and measures the distance to the nearest piece.

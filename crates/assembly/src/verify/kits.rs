@@ -9,7 +9,7 @@ use super::{Assembly, Verification, VerifyParams, examine};
 use crate::sequence::{InstallationPlan, InstallationStep};
 use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 
-/// Half the gap between faces, mm.
+/// Half of the gap between faces, mm.
 pub const HALF_GAP_MM: f64 = 0.05;
 
 pub fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
@@ -23,7 +23,8 @@ pub struct Kit {
 }
 
 impl Kit {
-    /// `directions`: the way out of each piece, in order of installation, which is the order of the pieces.
+    /// Builds a kit; `directions` are the ways out in order of installation, which is the order of the
+    /// pieces.
     pub fn new(model: Volume, pieces: &[Volume], directions: &[Vec3]) -> Self {
         let steps = directions.iter().enumerate();
         let steps = steps
@@ -58,7 +59,7 @@ impl Kit {
     }
 }
 
-/// The cube in three parts that lock, with this pin.
+/// Cube in three parts that lock, with this pin.
 pub fn pinned_lid(pin: [[f64; 2]; 3]) -> [Volume; 3] {
     let lid = PinnedLid {
         gap_mm: 2.0 * HALF_GAP_MM,

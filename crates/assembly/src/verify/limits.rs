@@ -1,31 +1,36 @@
-//! The standard that finished kits are judged by, with its reasons. An outside judge with measurements of its
-//! own has the limits of the second column; ours are stricter by what the two may measure differently.
+//! Limits by which finished kits are judged, with their reasons. An outside judge with its own measurements
+//! has the limits of the second column. Ours are stricter, to allow for differences between the two
+//! measurements.
 //!
 //! | limit | outside | here | why |
 //! | --- | --- | --- | --- |
-//! | common volume of two pieces at rest | 0.5 mm³ | 0.5 mm³ | a drop of resin; joints cut without any gap share 0.07 mm³ by rounding alone |
-//! | outside the model, share of its volume | 1e-4 | 0.5e-4 | nothing may stand out of the skin; measured by rays here |
-//! | outer surface kept, share | 0.97 | 0.975 | the figure must look as it was; four sigma of the samples above |
-//! | widest gap in the skin, to either side | 0.5 mm | 0.45 mm | a scratch that primer fills; a hole shows |
-//! | overlap on a way out | 0.5 mm³, 0.03 mm thick | a tenth less | thinner than the clearance, it rubs and goes |
-//! | what a push meets where it is held | 0.5 mm³ | a tenth more | less shears off or slips past |
-//! | length of a push ([`crate::push`]) | 3 clearances + 0.6 mm | the same | beyond all play and the roundness of printed edges |
+//! | common volume of two pieces at rest | 0.5 mm³ | 0.5 mm³ | a drop of resin (1) |
+//! | outside the model, share of its volume | 1e-4 | 0.5e-4 | nothing may protrude from the skin (2) |
+//! | outer surface kept, share | 0.97 | 0.975 | the figure must look unchanged (3) |
+//! | widest gap in the skin, to either side | 0.5 mm | 0.45 mm | primer fills a scratch; a hole shows |
+//! | overlap on a way out | 0.5 mm³, 0.03 mm thick | a tenth less | thinner than the clearance: it rubs off |
+//! | overlap with what stops a push | 0.5 mm³ | a tenth more | less shears off or slips past |
+//! | length of a push ([`crate::push`]) | 3 clearances + 0.6 mm | equal | more than all play (4) |
+//!
+//! (1) Joints cut without any gap share 0.07 mm³ by rounding alone. (2) Measured by rays here. (3) Four sigma
+//! of the samples above the outside limit. (4) And more than the roundness of printed edges.
 
-/// Common volume of two pieces that is still rounding, mm³.
+/// Greatest common volume of two pieces that counts as rounding, mm³.
 pub const OVERLAP_MM3: f64 = 0.5;
-/// Volume outside the model over the model's volume.
+/// Greatest volume outside the model, as a share of the model's volume.
 pub const OUTSIDE_SHARE: f64 = 0.5e-4;
 /// Least share of the outer surface that must be kept.
 pub const LEAST_KEPT: f64 = 0.975;
-/// Widest half gap allowed in the outer surface, mm: what goes deeper is a hole.
+/// Widest half gap allowed in the outer surface, mm; a wider one is a hole.
 pub const WIDEST_HALF_GAP_MM: f64 = 0.45;
-/// Overlap on the way out that is still rounding, mm³.
+/// Greatest overlap on the way out that counts as rounding, mm³.
 pub const RUB_MM3: f64 = 0.45;
-/// Mean thickness `2V/A` of an overlap on the way out that is still rounding, mm.
+/// Greatest mean thickness `2V/A` of an overlap on the way out that counts as rounding, mm.
 pub const RUB_MM: f64 = 0.027;
-/// Overlap with others that holds a piece that is pushed, mm³.
+/// Least overlap with others that holds a pushed piece, mm³.
 pub const HOLD_MM3: f64 = 0.55;
-/// Slots within one piece that are narrower are told, mm: resin fuses them, and no nozzle leaves them open.
+/// Width below which slots within one piece are reported, mm: resin fuses them, and no nozzle leaves them
+/// open.
 pub const LEAST_SLOT_MM: f64 = 0.2;
 /// Travels, mm, at which doubt about a way is always resolved exactly: those that the outside judge tries.
 pub const TRAVELS_MM: [f64; 18] = [

@@ -1,4 +1,4 @@
-//! Whether two pieces want the same place, and whether any leaves the model.
+//! Checks that no two pieces overlap, and that none leaves the model.
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
@@ -10,7 +10,7 @@ use super::{Check, Finding, rounded};
 use crate::PressFit;
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
-/// Most that a detent or a rib has in common with what it presses on, mm³: 2.8 × 0.6 × 0.4 mm, and rounding.
+/// Greatest common volume of a detent or a rib with its counterpart, mm³: 2.8 × 0.6 × 0.4 mm, and rounding.
 const PRESSED_MM3: f64 = 0.8;
 /// Common volume worth a warning, mm³: a tenth of the limit. Joints cut without any gap reached 0.07 by
 /// rounding alone (140 mm sphere shell in ten parts).
@@ -19,10 +19,10 @@ const WARN_MM3: f64 = 0.05;
 /// print.
 const RAY_SPACING: f64 = 0.001;
 const RAY_SPACING_MM: (f64, f64) = (0.02, 0.3);
-/// Rays parallel to no face of a common model.
+/// Direction of the rays, parallel to no face of a common model.
 const RAYS: Vec3 = Vec3::new(0.2631, 0.4517, 0.8525);
 
-/// Exact common volume of every pair whose boxes meet, but for what presses on purpose.
+/// Checks the exact common volume of every pair whose boxes meet, without intended press fits.
 pub fn check_pairs(
     ctx: &Ctx,
     bodies: &IdVec<PatchId, Body>,
@@ -70,7 +70,7 @@ pub fn check_pairs(
     ))
 }
 
-/// What both have, but for what presses on purpose: near its place, and no more than that takes.
+/// Common volume of both, without parts that are near a press fit and no larger than it needs.
 fn shared(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
     let common = a.intersect(b);
     if fits.is_empty() {
@@ -90,7 +90,7 @@ fn shared(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
     )
 }
 
-/// Volume of all pieces outside the model, measured along parallel rays.
+/// Checks the volume of all pieces outside the model, measured along parallel rays.
 pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Option<Finding>) {
     let frame = Frame::along(RAYS.normalize());
     let project = |points: &[Vec3]| -> Vec<Vec3> { points.iter().map(|&p| frame.project(p)).collect() };
@@ -98,7 +98,7 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
     let piece_points: Vec<Vec<Vec3>> = bodies.iter().map(|(_, b)| project(&b.mesh.points)).collect();
     let bounds = Aabb::around(model_points.iter().chain(piece_points.iter().flatten()).copied());
     let spacing_mm = (RAY_SPACING * bounds.diagonal()).clamp(RAY_SPACING_MM.0, RAY_SPACING_MM.1);
-    // A piece blown far away must not make the grid larger than memory.
+    // A piece far away must not make the grid larger than memory.
     let spacing_mm = spacing_mm.max(bounds.diagonal() / 4000.0);
     let grid = Grid::covering(bounds, spacing_mm);
     let whole = Columns::of(&grid, &model_points, &model.mesh().triangles, Vec3::ZERO);

@@ -1,8 +1,8 @@
-//! Whether each piece can travel along its separation direction through everything installed before it.
+//! Checks that each piece can travel along its separation direction past everything installed before it.
 //!
-//! For every ray along the direction `s` and every stretch `[a₀, a₁]` of the travelling piece, a stretch
-//! `[b₀, b₁]` of an earlier piece is in the way for travels `b₀ − a₁ < t < b₁ − a₀`, over a length that
-//! rises, stays and falls with slope one:
+//! Take any ray along the direction `s` and any interval `[a₀, a₁]` of the travelling piece. An interval
+//! `[b₀, b₁]` of an earlier piece is in the way for travels `b₀ − a₁ < t < b₁ − a₀`. The overlapping length
+//! rises, stays constant and falls with slope one:
 //!
 //! ```text
 //!  length |     ______
@@ -11,9 +11,9 @@
 //!        b₀−a₁         b₁−a₀
 //! ```
 //!
-//! Summed over all rays this gives the overlap volume for every travel at once. A body's area is at least
-//! twice its shadow, so the mean length of the stretches bounds the mean thickness `2V/A` from above. Only
-//! travels that exceed a bound in both are decided by an exact boolean.
+//! The sum over all rays is the overlap volume for every travel at once. A body's area is at least twice its
+//! shadow, so the mean length of the intervals bounds the mean thickness `2V/A` from above. Only travels that
+//! exceed a bound in both are decided by an exact boolean.
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3, Volume};
@@ -25,27 +25,28 @@ use super::{Check, Finding, rounded};
 use crate::InstallationStep;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Share of the two limits at which rays call for the exact answer. A margin against the sampling error of
-/// the rays, not a bound: an overlap thinner than a pixel is met in proportion to its area only on average.
+/// Share of the two limits at which the rays call for an exact result. It is a margin for the sampling error
+/// of the rays, not a bound: an overlap thinner than a pixel is met in proportion to its area only on
+/// average.
 const IN_DOUBT: f64 = 0.5;
-/// Ray spacing, mm.
+/// Distance between neighbouring rays, mm.
 const PIXEL_MM: f64 = 0.25;
-/// Most rays across the longer side of a piece's shadow; larger prints get wider pixels.
+/// Greatest number of rays across the longer side of a piece's shadow; larger prints get wider pixels.
 const MOST_PIXELS: f64 = 1200.0;
-/// Stretches that reach less far past each other are rounding, mm.
+/// Greatest overlap of two intervals that counts as rounding, mm.
 const ROUNDING_MM: f64 = 1e-3;
 
-/// A change of the overlap's length as the piece travels.
+/// Change of the overlap's length as the piece travels.
 #[derive(Clone, Copy)]
 struct Event {
     travel_mm: f64,
-    /// Change of the number of stretches that lengthen, less those that shorten.
+    /// Change of the number of intervals whose overlap grows, minus those whose overlap shrinks.
     slope: i32,
-    /// Change of the number of stretches that overlap.
+    /// Change of the number of overlapping intervals.
     count: i32,
 }
 
-/// Every path of the plan. `length_mm` is the farthest travel, the diagonal of the model's box.
+/// Checks every path of the plan. `length_mm` is the farthest travel, the diagonal of the model's box.
 pub fn check(
     ctx: &Ctx,
     bodies: &IdVec<PatchId, Body>,
@@ -121,7 +122,7 @@ fn check_path(
         .find_map(|&(travel_mm, _)| rub_at(piece, moving, separation * travel_mm, travel_mm, &partners))
 }
 
-/// How the overlap of `own`, moved along the rays, and `theirs` changes with the travel.
+/// Changes of the overlap of `own`, moved along the rays, with `theirs` over the travel.
 fn events_between(own: &Columns, theirs: &Columns) -> Vec<Event> {
     let mut events = Vec::new();
     for ray in 0..own.n_rays() {
@@ -199,7 +200,7 @@ fn travels_in_doubt(events: &mut Vec<Event>, cell_mm2: f64, length_mm: f64) -> V
     found
 }
 
-/// The exact overlap of `piece` moved by `travel`, where it is more than rounding, alone or together.
+/// Exact overlap of `piece` moved by `travel`, if it exceeds rounding with one partner or with all together.
 fn rub_at(
     piece: PatchId,
     moving: &Volume,
@@ -248,7 +249,7 @@ mod tests {
         Volume::union_all(parts.map(|(min, max)| cuboid(min, max)).collect())
     }
 
-    /// Overlap volume at `travel_mm` as the sweep of events has it.
+    /// Overlap volume at `travel_mm` according to the sweep of events.
     fn swept_volume(events: &[Event], travel_mm: f64) -> f64 {
         let passed = events.iter().filter(|e| e.travel_mm < travel_mm);
         passed

@@ -1,8 +1,8 @@
-//! Whether each piece but the key is held in every direction by the others.
+//! Checks that each piece except the key is held in every direction by the others.
 //!
-//! Each piece is pushed a small step in 66 directions and must run into the rest. Where its contacts face the
-//! push, they tell how much; elsewhere rays through the piece do, and an exact boolean decides near the
-//! limit.
+//! Each piece is pushed a small step in 66 directions and must collide with the rest. Where its contacts face
+//! the push, they give the overlap. Elsewhere, rays through the piece do, and an exact boolean decides near
+//! the limit.
 
 use std::cell::LazyCell;
 
@@ -17,26 +17,26 @@ use super::limits::HOLD_MM3;
 use super::{Check, Finding, rounded};
 use crate::{Cancelled, Ctx, IdVec, PatchId, push};
 
-/// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece is held: at a depth of 0.9 mm
-/// some thirty rays meet it then. A margin against the sampling error, not a bound.
+/// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece counts as held: at a depth of
+/// 0.9 mm some thirty rays meet the overlap then. A margin for the sampling error, not a bound.
 const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
-/// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the
+/// Estimated overlap below which a piece counts as loose, mm³: on the strict side of the limit, whatever the
 /// error.
 const SURELY_LOOSE_MM3: f64 = 0.1;
-/// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with
-/// its area and the depth to which both sides overlap there, up to this many mm.
+/// Overlap derived from contacts above which a piece counts as held, mm³: ten times the limit. Each contact
+/// counts with its area and the depth of the overlap of both sides there, up to the depth below, mm.
 const CONTACTS_HOLD_MM3: f64 = 5.5;
 const CONTACT_DEPTH_MM: f64 = 0.4;
-/// Rays into a side start so far below its surface, mm, and for each mm of gap that the nearest place may be nearer than
-/// the one ahead.
+/// Start of rays below the surface of a side, mm, plus a share of the gap, because the nearest place may be
+/// nearer than the one ahead.
 const START_MM: f64 = 0.005;
 const START_SHARE: f64 = 0.12;
-/// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
+/// Greatest number of rays across the longer side of a piece's shadow; larger prints get wider spacings.
 const MOST_PIXELS: f64 = 1200.0;
-/// Rays parallel to no face of a common model.
+/// Direction of the rays, parallel to no face of a common model.
 const RAYS: Vec3 = Vec3::new(0.3713, 0.5219, 0.7680);
 
-/// Pushes every piece but `key` by three clearances and 0.6 mm.
+/// Pushes every piece except `key` by three clearances and 0.6 mm.
 pub fn check(
     ctx: &Ctx,
     bodies: &IdVec<PatchId, Body>,
@@ -88,7 +88,7 @@ pub fn check(
     ))
 }
 
-/// A contact, and how thick both sides are there.
+/// Contact with the thickness of both sides.
 struct TwoSides {
     normal: Vec3,
     area_mm2: f64,
@@ -98,7 +98,7 @@ struct TwoSides {
 }
 
 impl TwoSides {
-    /// Of sides that are thicker than a push is long it is only known that they are as thick as that.
+    /// Measures both sides; thicknesses are capped at the length of a push.
     fn new(contact: &Contact, trees: &IdVec<PatchId, TriangleBvh>, push_mm: f64) -> Self {
         let Contact {
             a,
@@ -126,7 +126,8 @@ impl TwoSides {
         }
     }
 
-    /// How deep both sides overlap after a push by `step`, mm: a blade can be past another.
+    /// Depth of the overlap of both sides after a push by `step`, mm. Negative if they do not overlap, also
+    /// where a thin side has passed the other.
     fn depth_mm(&self, step: Vec3) -> f64 {
         let pushed_mm = self.normal.dot(step);
         let front_mm = pushed_mm.min(self.gap_mm + self.other_mm);
@@ -135,7 +136,7 @@ impl TwoSides {
     }
 }
 
-/// Whether the contacts of a piece alone show that a push by `step` is held.
+/// Returns true if the contacts of a piece alone prove that a push by `step` is held.
 fn contacts_hold(contacts: &[TwoSides], step: Vec3) -> bool {
     let overlap_mm3: f64 = contacts
         .iter()

@@ -1,26 +1,26 @@
-//! Points spread evenly over a surface, the same ones on every run.
+//! Points spread evenly over a surface, reproducible on every run.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::{TriMesh, Vec3};
 
-/// A point on a surface and the triangle it lies on.
+/// Point on a surface and the triangle that it lies on.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// Position, mm.
+    /// Position of the point, mm.
     pub point: Vec3,
     /// Unit normal of the triangle, outwards.
     pub normal: Vec3,
-    /// The triangle.
+    /// Index of the triangle.
     pub face: usize,
 }
 
-/// `n` points on `mesh`, one in each of `n` strata of equal area; a function of the mesh, `n` and `seed`
-/// alone.
+/// Samples `n` points on `mesh`, one in each of `n` strata of equal area; a function of the mesh, `n` and
+/// `seed` alone.
 ///
-/// Strata follow the order of the faces, so every region of more than two strata's area is met. Empty for a
-/// mesh without area.
+/// Strata follow the order of the faces, so every region of more than two strata's area gets a point. Empty
+/// for a mesh without area.
 pub fn on_surface(mesh: &TriMesh, n: usize, seed: u64) -> Vec<Sample> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let areas: Vec<f64> = (0..mesh.triangles.len()).map(|f| mesh.face_area(f)).collect();

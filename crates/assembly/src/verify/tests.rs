@@ -1,4 +1,4 @@
-//! Small assemblies of boxes whose verdict is known by thought.
+//! Tests on small assemblies of boxes whose verdict can be derived by thought.
 
 use shellock_geom::{TriMesh, Vec3, Volume};
 
@@ -85,8 +85,8 @@ fn a_path_through_a_wall_is_caught_with_place_and_partner() {
 #[test]
 fn a_pin_that_misses_the_base_leaves_it_loose() {
     let verdict = pinned_kit(|pieces| pieces[2] = brick(PIN[0], PIN[1], [20.0, 30.0])).verdict();
-    // The pin still holds the lid; the base slips off both along −x, and only the finite push can see it,
-    // because the base is the piece that the infinitesimal test holds.
+    // The pin still holds the lid. The base slips off both along −x. Only the finite push can see that,
+    // because the infinitesimal test holds the base.
     assert_eq!(
         verdict.findings[0],
         Finding::Loose {
@@ -205,7 +205,7 @@ fn the_verdict_is_the_same_on_one_thread_and_on_two_and_survives_json() {
         serde_json::to_string(&one).unwrap(),
         serde_json::to_string(&two).unwrap()
     );
-    // Parsing may change the last digit of a number, so only what has none is compared.
+    // Parsing may change the last digit of a number, so only fields without numbers are compared.
     let parsed: Verification = serde_json::from_str(&serde_json::to_string(&one).unwrap()).unwrap();
     assert_eq!(
         (parsed.checks, parsed.findings.len()),

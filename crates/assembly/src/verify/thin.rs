@@ -1,4 +1,4 @@
-//! How much of a piece is too thin to print well, and where: sheets of material and slots within one piece.
+//! Parts of a piece that are too thin to print well: sheets of material, and slots within one piece.
 
 use std::collections::HashMap;
 
@@ -9,30 +9,29 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use super::sample::{self, Sample};
 
-/// Rays shot into a piece. The share is known to 1 % (two sigma at one half).
+/// Number of rays shot into a piece. The share is known to 1 % (two sigma at one half).
 const N_SAMPLES: usize = 10_000;
-/// Cosine of the greatest angle between two sides that make a wall; beyond 30° they make an edge, which
-/// always is thin.
+/// Cosine of the greatest angle between two sides of a wall; beyond 30° they form an edge, which is always
+/// thin.
 const COS_WALL: f64 = 0.866_025_403_784_438_6;
-/// Where the ray starts below the surface, mm: more than rounding to single precision, less than any wall.
+/// Start of the ray below the surface, mm: more than rounding to single precision, less than any wall.
 const START_MM: f64 = 1e-4;
-/// One stream of random numbers for every piece.
+/// Seed of the random numbers, the same for every piece.
 const SEED: u64 = 0x7468_696e;
 
-/// What [`thin_share`] found.
+/// Result of [`thin_share`] for one piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinShare {
-    /// Volume in walls thinner than asked for, over the piece's volume, in [0, 1].
+    /// Volume in walls thinner than the limit, over the piece's volume, in [0, 1].
     pub share: f64,
-    /// The thinnest wall met: its place on the surface and its thickness, mm. `None` where no wall is too
-    /// thin.
+    /// Thinnest wall found: its place on the surface and its thickness, mm. `None` if no wall is too thin.
     pub worst: Option<([f64; 3], f64)>,
 }
 
-/// Share of a closed mesh's volume in walls thinner than `min_wall_mm`, and the thinnest place met.
+/// Share of a closed mesh's volume in walls thinner than `min_wall_mm`, and the thinnest place found.
 ///
-/// Rays go inwards from 10 000 surface points; one counts where it meets, within `min_wall_mm`, a surface
-/// that faces away within 30°. Each side of a wall owns half its volume. Nothing is thin in an empty mesh.
+/// Rays go inwards from 10 000 surface points. A ray counts if it meets, within `min_wall_mm`, a surface that
+/// faces away within 30°. Each side of a wall owns half its volume. An empty mesh has no thin walls.
 pub fn thin_share(mesh: &TriMesh, min_wall_mm: f64) -> ThinShare {
     let samples = sample::on_surface(mesh, N_SAMPLES, SEED);
     let volume = mesh.signed_volume();
@@ -68,47 +67,49 @@ pub fn thin_share(mesh: &TriMesh, min_wall_mm: f64) -> ThinShare {
     }
 }
 
-/// Rays a mm² for places: a place as long as [`LEAST_LENGTH_MM`] and a quarter as wide is met by six.
+/// Number of rays per mm² for places: a place as long as [`LEAST_LENGTH_MM`] and a quarter as wide is met by
+/// six.
 const RAYS_PER_MM2: f64 = 6.0;
-/// Most rays of one piece, each way.
+/// Greatest number of rays of one piece, in each direction.
 const MOST_RAYS: usize = 300_000;
-/// Cosine of the greatest angle between the two sides of a sheet or a slot; beyond 15° they make an edge or a
+/// Cosine of the greatest angle between the two sides of a sheet or a slot; beyond 15° they form an edge or a
 /// notch.
 const COS_SHEET: f64 = 0.965_925_826_289_068_3;
-/// Points that are nearer to each other lie in one place, mm: three mean distances between rays.
+/// Distance below which points belong to the same place, mm: three mean distances between rays.
 const JOINED_MM: f64 = 1.2;
-/// Shorter places are not told, mm, and places met by fewer rays.
+/// Least length of a reported place, mm, and least number of rays that meet it.
 const LEAST_LENGTH_MM: f64 = 2.0;
 const LEAST_RAYS: usize = 4;
 
-/// What is too thin.
+/// Kind of a feature that is too thin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ThinKind {
-    /// Material between two faces: it may break off.
+    /// Sheet of material between two faces: it may break off.
     Sheet,
-    /// Air between two faces of one piece: it may fuse.
+    /// Slot between two faces of one piece: it may fuse.
     Slot,
 }
 
-/// Where a piece is too thin to print well.
+/// Place where a piece is too thin to print well.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThinFeature {
-    /// Sheet or slot.
+    /// Kind of the feature: sheet or slot.
     pub kind: ThinKind,
-    /// How long it is, mm: the diagonal of its bounds.
+    /// Length of the place, mm: the diagonal of its bounds.
     pub length_mm: f64,
-    /// How thick in the median, mm.
+    /// Median thickness of the place, mm.
     pub thickness_mm: f64,
-    /// The ray that met it nearest to its middle, mm.
+    /// Point of the place that is nearest to its centre, mm.
     pub at: [f64; 3],
 }
 
-/// Sheets of material thinner than `least_wall_mm` and slots narrower than `least_slot_mm` within one piece,
-/// 2 mm or longer; the longest first.
+/// Finds sheets of material thinner than `least_wall_mm` and slots narrower than `least_slot_mm` within one
+/// piece, 2 mm or longer; the longest first.
 ///
-/// From points on the surface a ray goes inwards and one outwards. Where it meets, within the limit, a face
-/// that is parallel within 15°, the point is thin; thin points of one kind less than 1.2 mm apart are one place.
+/// From points on the surface, one ray goes inwards and one outwards. If a ray meets, within the limit, a
+/// face that is parallel within 15°, the point is thin. Thin points of one kind less than 1.2 mm apart form
+/// one place.
 pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinFeature> {
     let all = thin_points(mesh, [least_wall_mm, least_slot_mm], &|_| true);
     let mut places: Vec<ThinFeature> = all.iter().map(|members| feature(members)).collect();
@@ -116,21 +117,21 @@ pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Ve
     places
 }
 
-/// A point of the surface across which a piece is thin.
+/// Point of the surface across which a piece is thin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinPoint {
-    /// Sheet or slot.
+    /// Kind of the feature: sheet or slot.
     pub kind: ThinKind,
-    /// The point, mm.
+    /// Position of the point, mm.
     pub at: Vec3,
     /// Unit vector across the sheet or the slot.
     pub across: Vec3,
-    /// How far the other side is, mm.
+    /// Distance to the other side, mm.
     pub thickness_mm: f64,
 }
 
-/// The points of each sheet thinner and each slot narrower than its limit (mm, 0 for none) that [`thin_places`]
-/// tells of, of those that `counts` accepts; in no order, always the same for the same mesh.
+/// Finds the points of the sheets and slots that [`thin_places`] reports, for given limits (mm, 0 for none),
+/// among those that `counts` accepts. The order is arbitrary, but equal for equal meshes.
 pub fn thin_points(
     mesh: &TriMesh,
     limits_mm: [f64; 2],
@@ -150,7 +151,7 @@ pub fn thin_points(
             let across = sense * s.normal;
             let (face, on_mm) = bvh.first_hit(s.point + across * START_MM, across, limit_mm)?;
             let opposed = -s.normal.dot(mesh.face_normal(face as usize));
-            // Faces that touch there are an edge, not a sheet.
+            // Faces that touch there form an edge, not a sheet.
             (opposed >= COS_SHEET && on_mm > 10.0 * START_MM).then_some(ThinPoint {
                 kind,
                 at: s.point,
@@ -177,7 +178,7 @@ fn bounds(members: &[ThinPoint]) -> Aabb {
     Aabb::around(members.iter().map(|m| m.at))
 }
 
-/// One place of its points.
+/// Summarises the points of one place.
 fn feature(members: &[ThinPoint]) -> ThinFeature {
     let bounds = bounds(members);
     let middle = bounds.center();
@@ -196,7 +197,7 @@ fn feature(members: &[ThinPoint]) -> ThinFeature {
     }
 }
 
-/// The points in groups whose members are linked by steps of [`JOINED_MM`], in the order of their first ones.
+/// Groups of points linked by steps of [`JOINED_MM`], in the order of their first points.
 fn joined(points: &[ThinPoint]) -> Vec<Vec<ThinPoint>> {
     let cube = |p: Vec3| (p / JOINED_MM).floor().to_array().map(|x| x as i32);
     let mut members: HashMap<[i32; 3], Vec<usize>> = HashMap::new();

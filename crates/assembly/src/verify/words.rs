@@ -4,15 +4,15 @@ use std::fmt::{Display, Formatter, Result};
 
 use super::{Finding, Motion, Play};
 
-/// How places and ways are told.
+/// Wording of places and directions in messages.
 pub trait PlaceWords {
-    /// A place, as in "at (1.0, 2.0, 3.0) mm" or "left front, 42 mm up".
+    /// Phrase for a place, such as "at (1.0, 2.0, 3.0) mm" or "left front, 42 mm up".
     fn place(&self, at: [f64; 3]) -> String;
-    /// A direction, as in "along (1.00, 0.00, 0.00)" or "to the left".
+    /// Phrase for a direction, such as "along (1.00, 0.00, 0.00)" or "to the left".
     fn way(&self, along: [f64; 3]) -> String;
 }
 
-/// Places and ways as figures, mm in assembly space.
+/// Wording of places and directions as figures, mm in assembly space.
 pub struct Coordinates;
 
 impl PlaceWords for Coordinates {
@@ -32,7 +32,7 @@ impl Display for Finding {
 }
 
 impl Finding {
-    /// A sentence, with places as `words` has them.
+    /// Sentence about the finding, with places worded by `words`.
     pub fn told(&self, words: &dyn PlaceWords) -> String {
         match self {
             Self::PlanBroken { piece } => format!("the plan does not name piece {piece} exactly once"),
@@ -98,7 +98,7 @@ impl Finding {
     }
 }
 
-/// What of the play is more than is allowed.
+/// Phrase about the figures of a play that exceed their limits.
 fn too_wide(play: &Play, [most_mm, most_deg]: [f64; 2]) -> String {
     if !play.translation_mm.is_finite() || !play.rotation_deg.is_finite() {
         return "moves without end".to_owned();

@@ -1,12 +1,13 @@
-//! Every warning's code, severity and sentence: what, where, what to do.
+//! Code, severity and sentence of every warning: what is wrong, where, and what to do.
 
 use super::{Cause, EstimatedPlay, Severity, SizeLimit, Warning};
 use crate::PatchId;
 
-/// A wall whose stress is so many times what its material bears breaks in the fall that it was made for.
+/// Ratio of a wall's stress to the material's strength from which the wall breaks in the fall that it was
+/// designed for.
 const MUCH_TOO_WEAK: f64 = 2.0;
 
-/// What there is to say.
+/// Code, severity and sentence of one warning.
 pub(super) struct Told {
     pub code: &'static str,
     pub severity: Severity,
@@ -36,18 +37,18 @@ fn problem(code: &'static str, sentence: String) -> Told {
 }
 
 impl Warning {
-    /// "3, 5".
+    /// Ids of the pieces, such as "3, 5".
     fn ids(&self) -> String {
         let ids: Vec<String> = self.pieces.iter().map(ToString::to_string).collect();
         ids.join(", ")
     }
 
-    /// Of the piece that the sentence names first, or of the one after it.
+    /// Id of the piece at index `i` in the sentence; "?" if there is none.
     fn id(&self, i: usize) -> String {
         self.pieces.get(i).map_or_else(|| "?".into(), ToString::to_string)
     }
 
-    /// One table, a row for each cause, in the order of the stages.
+    /// One table, with a row for each cause, in the order of the stages.
     #[expect(clippy::too_many_lines, reason = "a table, one row for each cause")]
     pub(super) fn told(&self) -> Told {
         let (first, second) = (self.id(0), self.id(1));
@@ -482,7 +483,7 @@ impl Warning {
     }
 }
 
-/// The first of several reasons, and how many there are beside.
+/// First of several reasons, and the number of the others.
 fn shortened(reasons: &[String]) -> String {
     match reasons {
         [] => "nothing better was found".to_owned(),
@@ -491,7 +492,7 @@ fn shortened(reasons: &[String]) -> String {
     }
 }
 
-/// "2 thin sheets, which may break off, and a hair slot, which may fuse".
+/// Phrase such as "2 thin sheets, which may break off, and a hair slot, which may fuse".
 fn thin_places(n_sheets: usize, n_slots: usize) -> String {
     let count = |n: usize, what: &str, risk: &str| match n {
         0 => None,
@@ -507,7 +508,7 @@ fn thin_places(n_sheets: usize, n_slots: usize) -> String {
 }
 
 impl SizeLimit {
-    /// Why, and what helps.
+    /// Reason for the limit, and its remedy.
     fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Seam => (
@@ -522,7 +523,7 @@ impl SizeLimit {
     }
 }
 
-/// What to do about a key that was chosen, where it could be cut instead.
+/// Advice for a chosen key that could be cut instead.
 fn or_cut(may_be_cut: bool) -> &'static str {
     if may_be_cut {
         ", or let the key be cut (--key auto)"
@@ -531,7 +532,7 @@ fn or_cut(may_be_cut: bool) -> &'static str {
     }
 }
 
-/// "piece 3", "pieces 3, 5".
+/// Phrase such as "piece 3" or "pieces 3, 5".
 fn in_words(pieces: &[PatchId]) -> String {
     let ids: Vec<String> = pieces.iter().map(ToString::to_string).collect();
     format!(
@@ -557,7 +558,7 @@ mod tests {
         }
     }
 
-    /// The causes with the longest words, with figures as they come.
+    /// Causes with the longest sentences, with typical figures.
     fn long() -> Vec<Cause> {
         let done = || "dropped onto its feet".to_owned();
         vec![

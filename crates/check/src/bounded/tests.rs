@@ -1,21 +1,21 @@
-//! Cubes in hollows that are 0.1 mm wider all round: by hand, what ends each of their motions.
+//! Cubes in hollows with 0.1 mm of room all round: the bounds on each of their motions, derived by hand.
 
 use super::*;
 use crate::bearing::located;
 use crate::mesh::tests::{cuboid, hollow};
 use crate::quantity::tests::cube;
 
-/// Bearings are so far from the edges, mm.
+/// Distance of bearings from the edges, mm.
 const FROM_EDGE_MM: f64 = 0.1;
-/// Bearings of one cube in one hollow: four on each face.
+/// Number of bearings of one cube in one hollow: four on each face.
 const N: usize = 24;
 
 fn sign(i: usize) -> f64 {
     if i == 1 { 1.0 } else { -1.0 }
 }
 
-/// Four on each face of cube `a`, of half side `half_mm`, that face hollow `b`: in order of axis, side, and
-/// the two axes after it.
+/// Bearings of cube `a`, of half side `half_mm`, in hollow `b`: four on each face, ordered by axis, side, and
+/// the next two axes.
 fn of_cube(a: usize, b: usize, half_mm: f64) -> Vec<Bearing> {
     let of = |i: usize| {
         let (axis, signs) = (i / 8, [i / 4 % 2, i / 2 % 2, i % 2].map(sign));
@@ -35,13 +35,13 @@ fn of_cube(a: usize, b: usize, half_mm: f64) -> Vec<Bearing> {
     (0..N).map(of).collect()
 }
 
-/// The rows from `first` on that end a displacement of the cube along an axis: all of that face.
+/// Rows from `first` on that bound a displacement of the cube along an axis: all those of that face.
 fn shifted(first: usize, axis: usize, side: usize) -> Vec<(usize, f64)> {
     (0..4).map(|i| (first + 8 * axis + 4 * side + i, 0.25)).collect()
 }
 
-/// Those that end a turn about an axis: on two opposite faces the two that rise, by the second axis after the
-/// face's or by the first.
+/// Rows that bound a rotation about an axis: on two opposite faces, the two points that rise, by the second
+/// axis after the face's or by the first.
 fn turned(first: usize, axis: usize, side: usize, half_mm: f64, by_second: bool) -> Vec<(usize, f64)> {
     let face = (axis + if by_second { 2 } else { 1 }) % 3;
     let rises = |i: &usize| {
@@ -53,12 +53,12 @@ fn turned(first: usize, axis: usize, side: usize, half_mm: f64, by_second: bool)
     (0..N).filter(rises).map(|i| (first + i, multiplier)).collect()
 }
 
-/// For each axis what is against it and along it.
+/// Ends against each axis and along it.
 fn both(ends: impl Fn(usize, usize) -> Vec<(usize, f64)>) -> Vec<Ends> {
     (0..3).map(|axis| [ends(axis, 0), ends(axis, 1)]).collect()
 }
 
-/// A cube of 10 mm, piece 1, in a hollow of piece 0.
+/// Cube of 10 mm, piece 1, in a hollow of piece 0.
 struct Caged {
     meshes: Vec<Mesh>,
     bearings: Vec<Bearing>,
@@ -90,7 +90,7 @@ impl Caged {
         }
     }
 
-    /// The same as the key in a shaft that is open upwards, which it has left by up to 0.4 mm.
+    /// The cube as the key in a shaft that is open upwards, along which it has slid by up to 0.4 mm.
     fn key() -> Self {
         let mut caged = Self::new();
         let shaft = cuboid([-5.1; 3], [5.1, 5.1, 50.0]).triangles;
@@ -126,7 +126,7 @@ impl Caged {
         test(&kit, &self.claim)
     }
 
-    /// Why it is refused once `change` has been at it.
+    /// Error message after `change` has been applied.
     fn refused(mut self, change: impl FnOnce(&mut Self)) -> String {
         assert!(self.test().is_ok());
         change(&mut self);
@@ -161,7 +161,7 @@ fn a_wider_hollow_is_refused() {
     assert!(wider.ends_with("nothing is above"), "{wider}");
 }
 
-/// The hollow with a pit of 2 mm in its wall along x, square, between the same two numbers along y and z.
+/// Hollow with a square pit of 2 mm in its wall along x, between the same two coordinates along y and z.
 fn pitted([from, to]: [f64; 2]) -> Mesh {
     let square = |x: f64, [from, to]: [f64; 2]| [[x, from, from], [x, to, from], [x, to, to], [x, from, to]];
     let rings = [
@@ -244,7 +244,7 @@ fn a_key_is_bounded_while_its_slide_is() {
     slide(|s| s.seat = 1);
 }
 
-/// The cube in a hollow cube of 16 mm, piece 1, in a hollow of piece 0: both are free. The cube is piece 2.
+/// Cube, piece 2, in a hollow cube of 16 mm, piece 1, in a hollow of piece 0: both are free.
 fn nested() -> Caged {
     let quantities = vec![
         cube(Some(1), None, None, 0.014),
@@ -261,7 +261,7 @@ fn nested() -> Caged {
         both(|k, s| shifted(outer, k, s)),
         both(|k, s| sum(turned(outer, k, s, 8.0, false), turned(inner, k, s, 5.0, true))),
         both(|k, s| sum(shifted(outer, k, s), shifted(inner, k, s))),
-        // The hollow against the cube in it: the other way.
+        // The hollow against the cube in it: the opposite direction.
         both(|k, s| turned(inner, k, 1 - s, 5.0, false)),
         both(|k, s| shifted(inner, k, 1 - s)),
     ];
@@ -300,7 +300,8 @@ fn a_region_of_another_pair_is_refused_also_where_it_is_of_one_of_its_pieces() {
     nested().refused(|c| c.claim.of_piece = vec![[0, 1]]);
 }
 
-/// Points of the cube at random poses, as far as they are told, are where the rows' errors say they are.
+/// At random poses within the bounds, the cube's points deviate from the linear prediction by no more than
+/// the errors of the rows.
 #[test]
 fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
     let Caged { claim, bearings, .. } = nested();
@@ -321,7 +322,7 @@ fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
     }
 }
 
-/// The place that a pose takes `p` to, from small steps along its velocity field.
+/// Place to which a pose moves `p`, by small steps along its velocity field.
 fn moved([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
     const STEPS: usize = 64;
     let at = |p: Vec3| -> Vec3 { std::array::from_fn(|k| (v[k] + cross(w, p)[k]) / STEPS as f64) };
@@ -331,17 +332,17 @@ fn moved([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
     })
 }
 
-/// The place that it takes to `p`.
+/// Place that a pose moves to `p`.
 fn back([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
     moved([w.map(|x| -x), v.map(|x| -x)], p)
 }
 
-/// The same surface in `n²` parts of each triangle.
+/// Splits each triangle into `n²` parts of the same surface.
 fn divided(mesh: &Mesh, n: usize) -> Mesh {
     let mut triangles = Vec::new();
     for &[a, b, c] in &mesh.triangles {
-        // From the corners' weights, so that neighbours have the same points but for rounding that f32 takes
-        // away.
+        // Computed from the corners' weights, so that neighbours have the same points except for rounding,
+        // which f32 removes.
         let at = |i: usize, k: usize| -> Vec3 {
             let weights = [n - i - k, i, k].map(|w| w as f64 / n as f64);
             std::array::from_fn(|axis| {

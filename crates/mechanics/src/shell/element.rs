@@ -1,51 +1,51 @@
 //! The flat triangle with six degrees of freedom a node: Felippa's optimal membrane and the discrete
 //! Kirchhoff plate.
 //!
-//! Both are written as strains that are linear in the 18 displacements u of the three nodes, at points of the
-//! triangle with weights: K = Σ w Bᵀ C B. Strains are (ε_x, ε_y, γ_xy) in the triangle's frame, x along the
-//! first edge, z along the normal.
+//! Both parts are written as strains that are linear in the 18 displacements u of the three nodes, at
+//! weighted points of the triangle: K = Σ w Bᵀ C B. Strains are (ε_x, ε_y, γ_xy) in the triangle's frame,
+//! with x along the first edge and z along the normal.
 //!
-//! Membrane (C. Felippa, A study of optimal membrane triangles with drilling freedoms, 2003): the mean
-//! strains, in which drilling rotations bend the edges as in Allman's triangle, and, at the middles of the
-//! edges, the strains of bending in the plane, which the rotations relative to that of the whole triangle
-//! cause. Bending (J.-L. Batoz, K.-J. Bathe, L.-W. Ho, A study of three-node triangular plate bending
-//! elements, 1980): the slope β of the normal is linear and, along each edge, bulges so that no shear is left
-//! there; nodes in the middles of edges never appear.
+//! Membrane (C. Felippa, A study of optimal membrane triangles with drilling freedoms, 2003) has two terms.
+//! The mean strains include drilling rotations, which bend the edges as in Allman's triangle. The in-plane
+//! bending strains, at the midpoints of the edges, come from the rotations relative to that of the whole
+//! triangle. Bending (J.-L. Batoz, K.-J. Bathe, L.-W. Ho, A study of three-node triangular plate bending
+//! elements, 1980): the slope β of the normal is linear, plus a bulge along each edge that cancels the shear
+//! there. Mid-edge nodes never appear.
 //!
-//! All strains of rigid motions are 0, and those of constant strain or curvature exact, whatever the two
-//! shares below are.
+//! All rigid motions have zero strain, and constant strains and curvatures are exact, for any values of the
+//! two shares below.
 
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector3};
 use shellock_geom::Vec3;
 
-/// Rows: strains or curvatures. Columns: displacement and rotation of the first node, then of the second and
-/// the third.
+/// Strain or curvature matrix, one strain a row. Columns: displacement and rotation of the first node, then
+/// of the second and the third.
 pub(super) type Strains = SMatrix<f64, 3, 18>;
 
-/// Stiffness between the nodes' displacements and rotations.
+/// Stiffness matrix of the nodes' displacements and rotations.
 pub(super) type Stiffness = SMatrix<f64, 18, 18>;
 
-/// Share of the drilling rotations in the mean strain, α_b: 3/2, that of Allman's triangle, the best in
-/// bending in the plane.
+/// Share of the drilling rotations in the mean strain, α_b. 3/2 is that of Allman's triangle and the best for
+/// in-plane bending.
 const DRILLING_SHARE: f64 = 1.5;
 
-/// The edges by the nodes at their ends, each after the node opposite.
+/// Edges by their end nodes; edge i starts at node i.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
-/// Share of the stiffness in bending in the plane, β_0, which is what holds the drilling rotations.
+/// Share of the in-plane bending stiffness, β_0, which restrains the drilling rotations.
 ///
-/// (1 − 4ν²) / 2, Felippa's, makes rectangles exact in the plane, but stops curved shells from bending
-/// without stretching: a hemisphere with 8 elements a quarter edge reaches 0.49 of its displacement, with
-/// this value 0.92. What it costs is 2 % too much in a beam two elements wide, 10 % in one a single element
-/// wide. At 0.001 the hemisphere reaches 0.96.
+/// Felippa's (1 − 4ν²) / 2 makes rectangles exact in the plane, but keeps curved shells from bending without
+/// stretching. A hemisphere with 8 elements a quarter edge then reaches 0.49 of its displacement; with this
+/// value, 0.92. The price is 2 % too much in a beam two elements wide, 10 % in one a single element wide. At
+/// 0.001 the hemisphere reaches 0.96.
 const IN_PLANE_BENDING_SHARE: f64 = 0.02;
 
-/// How a triangle's stresses follow from displacements.
+/// Strain matrices that give a triangle's stresses from its displacements.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
-    /// Mean strains of the middle surface.
+    /// Mean strains of the middle surface, per displacement.
     pub(super) membrane: Strains,
-    /// Curvatures at the centre, 1/mm; positive where the outer face is stretched.
+    /// Curvatures at the centre, 1/mm; positive where the outer face is in tension.
     pub(super) curvature: Strains,
 }
 
@@ -54,7 +54,7 @@ struct Plane {
     x_axis: Vec3,
     y_axis: Vec3,
     normal: Vec3,
-    /// Corners from the centre, mm.
+    /// Corners relative to the centroid, mm.
     corners: [[f64; 2]; 3],
     area: f64,
 }
@@ -76,7 +76,7 @@ impl Plane {
         }
     }
 
-    /// From corner i to corner j.
+    /// Vector from corner i to corner j.
     fn edge(&self, [i, j]: [usize; 2]) -> [f64; 2] {
         [
             self.corners[j][0] - self.corners[i][0],
@@ -92,7 +92,8 @@ impl Plane {
         })
     }
 
-    /// The linear form of the displacements that `parts` give: (node, of its displacement, of its rotation).
+    /// Linear form of the displacements, summed from `parts`: (node, factor of its displacement, factor of
+    /// its rotation).
     fn form(parts: &[(usize, Vec3, Vec3)]) -> SVector<f64, 18> {
         let mut form = SVector::zeros();
         for &(node, of_move, of_turn) in parts {
@@ -105,7 +106,7 @@ impl Plane {
     }
 }
 
-/// Stress over strain in the plane for thickness 1 and no stress across, MPa.
+/// Plane-stress elasticity matrix (stress over strain, no stress across the wall) for thickness 1, MPa.
 pub(super) fn plane_stress(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Matrix3<f64> {
     let nu = poissons_ratio;
     let shear = 0.5 * (1.0 - nu);
@@ -113,7 +114,7 @@ pub(super) fn plane_stress(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Matr
 }
 
 impl Element {
-    /// The element and its stiffness in the membrane and in bending, for thickness 1 mm.
+    /// Computes the element and its membrane and bending stiffness for thickness 1 mm.
     pub(super) fn new(corners: [Vec3; 3], elasticity: &Matrix3<f64>) -> (Self, [Stiffness; 2]) {
         let plane = Plane::new(corners);
         let membrane = mean_strains(&plane);
@@ -141,7 +142,7 @@ fn quadratic(strains: &Strains, elasticity: &Matrix3<f64>, weight: f64) -> Stiff
     strains.tr_mul(&(elasticity * strains * weight))
 }
 
-/// Mean strains: those of the corners' displacements, and of the edges, which the drilling rotations bend
+/// Mean strains from the corners' displacements, and from the edges, which the drilling rotations bend
 /// outwards or inwards.
 fn mean_strains(plane: &Plane) -> Strains {
     let mut strains = Strains::zeros();
@@ -157,7 +158,7 @@ fn mean_strains(plane: &Plane) -> Strains {
     strains
 }
 
-/// Strains at the middles of the edges from the rotations of the corners relative to that of the triangle.
+/// Strains at the midpoints of the edges from the corners' rotations relative to that of the triangle.
 fn in_plane_bending_strains(plane: &Plane) -> [Strains; 3] {
     let whole = plane
         .gradients()
@@ -168,7 +169,7 @@ fn in_plane_bending_strains(plane: &Plane) -> [Strains; 3] {
         });
     let relative = [0, 1, 2].map(|i| Plane::form(&[(i, Vec3::ZERO, plane.normal)]) - whole);
     let sum = relative[0] + relative[1] + relative[2];
-    // From strains along the edges to those along the axes.
+    // Transforms strains along the edges to strains along the axes.
     let lengths_sq = EDGES.map(|edge| plane.edge(edge).map(|x| x * x).iter().sum::<f64>());
     let along = Matrix3::from_rows(&[0, 1, 2].map(|e| {
         let [x, y] = plane.edge(EDGES[e]);
@@ -210,7 +211,7 @@ fn curvatures(plane: &Plane, at: [f64; 3]) -> Strains {
     strains
 }
 
-/// Strain of a displacement along `direction` whose size has gradient `g`.
+/// Strain of a displacement along `direction` whose magnitude has gradient `g`.
 fn outer(g: [f64; 2], direction: [f64; 2]) -> Vector3<f64> {
     Vector3::new(
         g[0] * direction[0],

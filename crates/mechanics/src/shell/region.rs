@@ -1,4 +1,4 @@
-//! Nodes that hold in the mean: the reaction that balances a load, and the rigid motion left in a
+//! Nodes held in the mean: the reaction that balances a load, and the rigid motion contained in a
 //! displacement.
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
@@ -6,8 +6,8 @@ use shellock_geom::{Aabb, Vec3};
 
 use super::DOFS;
 
-/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which
-/// it is a line.
+/// Least ratio of a region's smallest to greatest eigenvalue of inertia, with lengths in units of its size.
+/// Below it the region is a line.
 const MIN_INERTIA: f64 = 1e-10;
 
 /// Weighted nodes with the inertia of their rigid motions.
@@ -21,7 +21,7 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// `None` where the nodes lie on a line.
+    /// Builds the region; `None` if the nodes lie on a line.
     pub(super) fn new(nodes: Vec<u32>, points: &[Vec3], areas: &[f64]) -> Option<Self> {
         let at = |&v: &u32| points[v as usize];
         let weights: Vec<f64> = nodes.iter().map(|&v| areas[v as usize]).collect();
@@ -43,7 +43,7 @@ impl Region {
         let mut inertia = Matrix6::zeros();
         for (v, w) in nodes.iter().zip(&weights) {
             for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
-                // The component along `axis` of a rigid motion at the node is linear in the motion.
+                // The component along `axis` of the node's displacement is linear in the rigid motion.
                 let form = wrench(axis, (at(v) - center) / size);
                 inertia += form * form.transpose() * (w / total);
             }
@@ -65,7 +65,8 @@ impl Region {
         (point - self.center) / self.size
     }
 
-    /// Adds to `loads` the traction on the region, linear in place, that balances the loads on `nodes`.
+    /// Adds to `loads` the traction on the region that balances the loads on `nodes`. The traction is linear
+    /// in position.
     pub(super) fn balance(&self, nodes: &[u32], points: &[Vec3], loads: &mut [f64]) {
         let motion = -self.inertia.solve(&self.resultant(nodes, points, loads));
         for (&v, w) in self.nodes.iter().zip(&self.weights) {
@@ -74,7 +75,7 @@ impl Region {
         }
     }
 
-    /// Force, and moment about the region's centre over its size, of the loads on `nodes`.
+    /// Resultant of the loads on `nodes`: force, and moment about the region's centre over the region's size.
     pub(super) fn resultant(&self, nodes: &[u32], points: &[Vec3], loads: &[f64]) -> Vector6<f64> {
         nodes.iter().fold(Vector6::zeros(), |sum, &v| {
             let mut load = wrench(part(loads, v, 0), self.arm(points[v as usize]));
@@ -112,7 +113,8 @@ impl Region {
     }
 }
 
-/// Whether the held degrees of freedom stop all rigid motions of `nodes`; nothing else moves without strain.
+/// Returns true if the held degrees of freedom stop all rigid motions of `nodes`. Any other motion causes
+/// strain.
 pub(super) fn holds(nodes: &[u32], points: &[Vec3], is_held: &[bool]) -> bool {
     let bounds = Aabb::around(nodes.iter().map(|&v| points[v as usize]));
     let mut stopped = Matrix6::zeros();

@@ -1,4 +1,4 @@
-//! One thickness: factorised once, solved for all load cases.
+//! Solver for one thickness: factorised once, solved for all load cases.
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
@@ -7,59 +7,58 @@ use shellock_geom::sparse::Cholesky;
 use super::region::{self, Region};
 use super::{DOFS, ShellError, ShellModel, THICKNESS_MM};
 
-/// Cases solved together: enough to read the factor once for several, few enough for two threads to share
-/// twelve.
+/// Number of load cases solved together: enough to share each read of the factor, few enough for two threads
+/// to share twelve.
 const CASES_AT_ONCE: usize = 6;
 
-/// Resultant of the loads on a part that no node holds, over the sum of their sizes, above which they do not
-/// balance.
+/// Greatest resultant of the loads on a part without held nodes, over the sum of their sizes, that counts as
+/// balanced.
 const MAX_UNBALANCE: f64 = 1e-6;
 
-/// Degrees of freedom of a node that do not move.
+/// Degrees of freedom of a node that are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Support {
-    /// The mesh's point.
+    /// Held point of the mesh.
     pub point: u32,
     /// Held displacements along x, y, z, and rotations about them.
     pub held: [bool; DOFS],
 }
 
-/// What pushes the shell, and what holds it.
+/// Loads on the shell, and the nodes that hold it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadCase {
     /// Force on each point, N.
     pub forces_n: Vec<Vec3>,
-    /// Moment on each point, N·mm; empty where there are none.
+    /// Moment on each point, N·mm; empty if there are none.
     pub moments_n_mm: Vec<Vec3>,
-    /// Points that hold in the mean, by area. Empty where the solver's supports hold, or where the loads
-    /// balance.
+    /// Points held in the mean, weighted by area. Empty if the solver has supports or the loads balance.
     pub held: Vec<u32>,
 }
 
-/// How far each point moves and turns.
+/// Displacement and rotation of each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Displacements {
-    /// Displacement, mm.
+    /// Displacement of each point, mm.
     pub moves_mm: Vec<Vec3>,
-    /// Rotation vector, rad; small.
+    /// Rotation vector of each point, rad; small.
     pub turns_rad: Vec<Vec3>,
 }
 
-/// A shell with a thickness, ready for load cases.
+/// Shell of a given thickness, factorised and ready for load cases.
 #[derive(Debug)]
 pub struct ShellSolver<'a> {
     pub(super) model: &'a ShellModel,
     pub(super) thickness_mm: f64,
     factor: Cholesky,
     is_held: Vec<bool>,
-    /// The points of each connected part, where cases hold their own.
+    /// Points of each connected part. Empty if the solver has supports.
     free_parts: Vec<Vec<u32>>,
 }
 
 impl<'a> ShellSolver<'a> {
     pub(super) fn free(model: &'a ShellModel, thickness_mm: f64) -> Result<Self, ShellError> {
         let free_parts = model.parts();
-        // One node of each part, held in all six, is a support that is statically determinate.
+        // Holding all six degrees of freedom of one node in each part is a statically determinate support.
         let supports: Vec<Support> = free_parts
             .iter()
             .map(|p| Support {
@@ -118,7 +117,7 @@ impl<'a> ShellSolver<'a> {
         })
     }
 
-    /// The displacements in each case, in the order of `cases`.
+    /// Computes the displacements in each load case, in the order of `cases`.
     pub fn solve(&self, cases: &[LoadCase]) -> Result<Vec<Displacements>, ShellError> {
         let groups: Vec<Vec<Displacements>> = cases
             .par_chunks(CASES_AT_ONCE)
@@ -154,7 +153,7 @@ impl<'a> ShellSolver<'a> {
             .collect())
     }
 
-    /// Forces and moments of a case.
+    /// Forces and moments of a load case, six values a node.
     fn loads(&self, at: usize, case: &LoadCase) -> Result<Vec<f64>, ShellError> {
         let want = self.model.points.len();
         let n_moments = if case.moments_n_mm.is_empty() {
@@ -182,7 +181,7 @@ impl<'a> ShellSolver<'a> {
         Ok(loads)
     }
 
-    /// Adds the reactions of the nodes that hold; gives their region for each free part.
+    /// Adds the reactions of the held nodes to `loads`. Returns the region that holds each free part.
     fn balance(&self, at: usize, case: &LoadCase, loads: &mut [f64]) -> Result<Vec<Region>, ShellError> {
         let model = self.model;
         let mut holds = vec![false; model.points.len()];
@@ -217,7 +216,7 @@ impl<'a> ShellSolver<'a> {
             region.balance(nodes, &model.points, loads);
             regions.push(region);
         }
-        // What pushes where a support holds goes straight into the support.
+        // A load on a held degree of freedom goes straight into the support.
         loads
             .iter_mut()
             .zip(&self.is_held)

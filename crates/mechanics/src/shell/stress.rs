@@ -10,7 +10,7 @@ use super::solver::{Displacements, ShellSolver};
 pub struct FaceStress {
     /// Von Mises' equivalent stress, MPa. ≥ 0.
     pub von_mises_mpa: f64,
-    /// Principal stresses in the face, the greater first, MPa; positive in tension. The third, across the
+    /// Principal stresses in the face, the greater first, MPa; positive in tension. The third, normal to the
     /// face, is 0.
     pub principal_mpa: [f64; 2],
 }
@@ -18,9 +18,9 @@ pub struct FaceStress {
 /// Stress at the centre of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShellStress {
-    /// At the face that the normal points out of.
+    /// Stress at the face that the normal points out of.
     pub outer: FaceStress,
-    /// At the other face.
+    /// Stress at the opposite face.
     pub inner: FaceStress,
 }
 
@@ -32,7 +32,7 @@ impl ShellStress {
 }
 
 impl FaceStress {
-    /// From σ_x, σ_y and τ_xy.
+    /// Computes the stresses from σ_x, σ_y and τ_xy.
     fn new(stress: Vector3<f64>) -> Self {
         let (mean, half, shear) = (0.5 * (stress.x + stress.y), 0.5 * (stress.x - stress.y), stress.z);
         let radius = half.hypot(shear);
@@ -47,7 +47,7 @@ impl ShellSolver<'_> {
     /// Cauchy stress at both faces of every triangle, in the order of the mesh's triangles.
     ///
     /// # Panics
-    /// Where `displacements` are of a shell with fewer points.
+    /// If `displacements` has fewer points than the shell.
     pub fn stresses(&self, displacements: &Displacements) -> Vec<ShellStress> {
         let model = self.model;
         let at_face = 0.5 * self.thickness_mm;

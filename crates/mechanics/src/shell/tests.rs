@@ -2,7 +2,7 @@ use shellock_geom::{TriMesh, Vec3};
 
 use super::*;
 
-/// A patch of irregular triangles in the plane z = 0 with its corners at ±10, and the points on its border.
+/// Patch of irregular triangles in the plane z = 0 with its corners at ±10, and the points on its border.
 fn patch() -> (TriMesh, Vec<bool>) {
     let n = 5;
     let points = (0..n * n).map(|at| {
@@ -43,7 +43,7 @@ fn patch() -> (TriMesh, Vec<bool>) {
     (mesh, is_border)
 }
 
-/// A closed surface of 2 n² points, 40 mm by 30 mm by 20 mm, not symmetric.
+/// Closed surface of 2 n² points, 40 mm by 30 mm by 20 mm, not symmetric.
 fn pebble(n: u32) -> TriMesh {
     let [around, up] = [2 * n, n];
     let mut points = vec![Vec3::Z * -10.0, Vec3::Z * 10.0];
@@ -81,7 +81,7 @@ fn model(mesh: &TriMesh) -> ShellModel {
     ShellModel::new(mesh, &Material::SLA_RESIN).unwrap()
 }
 
-/// Forces (moves) and moments (turns) that displacements call up in a shell of thickness `h`.
+/// Forces (moves) and moments (turns) that displacements cause in a shell of thickness `h`.
 fn forces(model: &ShellModel, h: f64, u: &Displacements) -> LoadCase {
     let mut stiffness = model.pattern.clone();
     for (value, (m, b)) in stiffness
@@ -111,7 +111,7 @@ fn largest(vectors: &[Vec3]) -> f64 {
     vectors.iter().map(|v| v.length()).fold(0.0, f64::max)
 }
 
-/// Pushes the lower part of `mesh` up and sideways, and holds the upper.
+/// Load case that pushes the lower part of `mesh` up and sideways, and holds the upper part.
 fn push(mesh: &TriMesh) -> LoadCase {
     let forces_n = mesh.points.iter().map(|p| {
         if p.z < -6.0 {
@@ -157,7 +157,7 @@ fn a_patch_that_is_stretched_evenly_has_even_stress_and_no_force_inside() {
     for (v, is_border) in is_border.iter().enumerate() {
         assert!(*is_border || (case.forces_n[v].length() < 1e-10 && case.moments_n_mm[v].length() < 1e-10));
     }
-    // The tractions' share of each corner of the border follows from the stress alone.
+    // The share of the tractions at each corner of the border follows from the stress alone.
     let stress = model.elasticity * nalgebra::Vector3::new(1e-3, -2e-3, 1e-3);
     let half_side = 2.5 * 2.0;
     let corner = mesh.points.iter().position(|p| p.x > 9.99 && p.y > 9.99).unwrap();
@@ -243,7 +243,7 @@ fn a_sphere_under_pressure_has_stress_p_r_over_2_h_at_every_thickness() {
     }
 }
 
-/// An octahedron with edges cut into `n`, blown up.
+/// Octahedron with edges split into `n`, projected onto a sphere.
 fn sphere(radius: f64, n: i32) -> TriMesh {
     let mut mesh = TriMesh::default();
     let mut index = std::collections::BTreeMap::new();
@@ -297,7 +297,7 @@ fn a_region_holds_in_the_mean_with_a_reaction_that_is_linear_in_place() {
             && turn.length() < 1e-8 * area * largest(&u.moves_mm)
     );
 
-    // Forces that the displacements call up: the case's, and the reaction where it is held.
+    // Forces caused by the displacements: the case's loads, and the reaction where it is held.
     let called_up = forces(&model, 1.5, &u);
     let reactions: Vec<Vec3> = called_up
         .forces_n
@@ -311,7 +311,7 @@ fn a_region_holds_in_the_mean_with_a_reaction_that_is_linear_in_place() {
         assert!(reactions[v].length() < 1e-6 * scale, "{v}: {}", reactions[v]);
     }
     assert!(largest(&called_up.moments_n_mm) < 1e-6 * scale);
-    // Of a traction a + b × x, the difference of two places is perpendicular to their distance.
+    // For a traction a + b × x, the difference between two places is perpendicular to their distance.
     for pair in case.held.windows(2) {
         let [p, q] = [pair[0], pair[1]].map(|v| v as usize);
         let difference = reactions[p] / areas[p] - reactions[q] / areas[q];

@@ -1,4 +1,4 @@
-//! One piece: its stiffness, factorised, and what forces at its places do to it.
+//! A piece with its factorised stiffness: displacements from forces at its places.
 
 use shellock_geom::sparse::{Cholesky, EliminationOrder, SparseSymmetric};
 use shellock_geom::{Solid, Vec3};
@@ -8,35 +8,35 @@ use super::element::{Elements, N_NODES, N_VOXELS, NODES, SIDE, centre, pairs, sh
 use super::voxels::voxels;
 use super::{SolidError, SolidParams};
 
-/// Stiffness of what is empty in a cell, as a share of the material's: it keeps nodes that hardly any
-/// material touches from being free. Chosen small beside voxels of which a hundredth is full.
+/// Stiffness of the empty share of a cell, relative to the material's. It keeps nodes with almost no material
+/// from being free. Chosen small beside voxels of which a hundredth is full.
 const VOID: f64 = 1e-5;
-/// What hangs on nothing at the size of voxels may be this share of a piece.
+/// Greatest loose share of a piece's volume at voxel resolution.
 const MOST_LOOSE: f64 = 0.02;
-/// Cells that a piece may have: their factor takes about 2 GB.
+/// Greatest number of cells of a piece; their factor takes about 2 GB.
 const MOST_CELLS: usize = 60_000;
-/// How far from its material a place may be, in voxels.
+/// Greatest distance of a place from its piece's material, in voxels.
 const REACH: i64 = 4;
-/// Share of material in the cells that hold a piece's frame.
+/// Least share of material in the cells that hold a piece's frame.
 const FIRM_SHARE: f32 = 0.3;
 
-/// A place of a piece: a copy of a cell, and where in it.
+/// Place in a piece: a copy of a cell, and the weights of its nodes there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub copy: u32,
     pub shapes: [f64; N_NODES],
 }
 
-/// A piece of mass points, and where its frame is.
+/// Reference frame of a piece, from its mass distribution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub center: Vec3,
-    /// Radius of gyration: rotations are counted in mm at that distance.
+    /// Radius of gyration, mm. Rotations are measured in mm at this distance.
     pub radius_mm: f64,
 }
 
 impl Frame {
-    /// What the six motions of the frame, each by 1 mm, do to what is at `p`.
+    /// Displacements of point `p` under the six motions of the frame, each by 1 mm.
     pub fn motions(&self, p: Vec3) -> [Vec3; 6] {
         let arm = (p - self.center) / self.radius_mm;
         std::array::from_fn(|j| {
@@ -49,7 +49,7 @@ impl Frame {
     }
 }
 
-/// A piece.
+/// A piece, discretised and factorised.
 pub(super) struct Body {
     pub cells: Cells,
     pub frame: Frame,
@@ -94,12 +94,12 @@ impl Body {
         })
     }
 
-    /// Numbers of unknowns.
+    /// Number of unknown displacements of the piece.
     pub fn n_rows(&self) -> usize {
         3 * self.cells.n_nodes
     }
 
-    /// The material nearest to `p`, seen from `inside` of it (a vector, mm, that leads into the piece).
+    /// Finds the material nearest to `p + inside`; the vector `inside`, mm, leads into the piece.
     pub fn place(&self, p: Vec3, inside: Vec3) -> Option<Place> {
         let voxel_mm = self.cell_mm / SIDE as f64;
         let from = (p + inside) / voxel_mm;
@@ -124,19 +124,19 @@ impl Body {
         })
     }
 
-    /// Where `p` is in a copy's cell, in [−1, 1]³, or a little outside.
+    /// Local coordinates of `p` in a copy's cell: in [−1, 1]³, or a little outside.
     pub fn xi(&self, copy: u32, p: Vec3) -> Vec3 {
         let cell = Vec3::from(self.cells.copies[copy as usize].cell.map(f64::from));
         2.0 * (p / self.cell_mm - cell) - Vec3::ONE
     }
 
-    /// Where node `i` of a copy is, mm.
+    /// Position of node `i` of a copy, mm.
     pub fn node(&self, copy: &Copy, i: usize) -> Vec3 {
         let at = |k: usize| f64::from(copy.cell[k]) + 0.5 + 0.5 * f64::from(NODES[i][k]);
         self.cell_mm * Vec3::new(at(0), at(1), at(2))
     }
 
-    /// Adds a force at a place.
+    /// Adds a force at a place to the nodal loads.
     pub fn push(&self, side: &mut [f64], place: &Place, force_n: Vec3) {
         let nodes = &self.cells.copies[place.copy as usize].nodes;
         for (node, weight) in nodes.iter().zip(place.shapes) {
@@ -145,7 +145,7 @@ impl Body {
         }
     }
 
-    /// How far a place has moved.
+    /// Displacement of a place, mm.
     pub fn moved(&self, displaced: &[f64], place: &Place) -> Vec3 {
         let nodes = &self.cells.copies[place.copy as usize].nodes;
         nodes
@@ -155,12 +155,12 @@ impl Body {
             .sum()
     }
 
-    /// Forces into displacements, relative to the frame; several loads one after the other.
+    /// Solves for displacements relative to the frame, in place; several loads may follow each other.
     pub fn solve(&self, sides: &mut [f64]) {
         self.factor.solve_in_place(sides);
     }
 
-    /// All its material as points: copy, voxel of the cell, place, volume in mm³.
+    /// Iterates over the piece's material as points: copy, voxel of the cell, position, volume in mm³.
     pub fn points(&self) -> impl Iterator<Item = (&Copy, usize, Vec3, f64)> {
         points(&self.cells, self.cell_mm)
     }
@@ -197,7 +197,7 @@ fn frame_of(cells: &Cells, cell_mm: f64) -> (Frame, f64) {
     (frame, volume)
 }
 
-/// The factor of the piece's stiffness, held at its frame.
+/// Factorises the piece's stiffness, held at its frame.
 fn factorised(cells: &Cells, elements: &Elements, cell_mm: f64) -> Result<Cholesky, SolidError> {
     let nodes: Vec<[u32; N_NODES]> = cells.copies.iter().map(|c| c.nodes).collect();
     let mut matrix = SparseSymmetric::of_cells(cells.n_nodes, 3, &nodes);
@@ -216,7 +216,7 @@ fn factorised(cells: &Cells, elements: &Elements, cell_mm: f64) -> Result<Choles
     Ok(Cholesky::in_order(&order, &matrix)?)
 }
 
-/// Adds the block of rows of node `i` and columns of node `j`.
+/// Adds the block for the rows of node `i` and the columns of node `j`.
 fn add_block(matrix: &mut SparseSymmetric, i: u32, j: u32, block: &[f64; 9]) {
     let is_upper = i <= j;
     let (row, column) = if is_upper { (i, j) } else { (j, i) };
@@ -236,9 +236,10 @@ fn add_block(matrix: &mut SparseSymmetric, i: u32, j: u32, block: &[f64; 9]) {
     }
 }
 
-/// Six directions at three nodes that hold the piece's frame, and bear nothing where forces balance: all
-/// three of the node farthest from the middle, two across the way to the one farthest from that, and one
-/// across both.
+/// Selects six directions at three nodes that hold the piece's frame. They carry nothing when forces balance.
+///
+/// Node a, farthest from the centre, is held in all three directions. Node b, farthest from a, is held in the
+/// two across line ab. Node c, farthest from that line, is held in the one across plane abc.
 fn holds(cells: &Cells) -> Vec<(u32, Vec3)> {
     let is_firm = |c: &&Copy| c.fills.iter().map(|f| f.share).sum::<f32>() >= FIRM_SHARE * N_VOXELS as f32;
     let place = |copy: &Copy, i: usize| {

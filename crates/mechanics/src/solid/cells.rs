@@ -1,10 +1,10 @@
-//! Cells with material, cut into what hangs together, and their nodes.
+//! Cells with material, split into connected parts, and their nodes.
 //!
 //! ```text
 //!   ┌─────────┐       ┌─────────┐   ┌─────────┐
-//!   │▒▒▒   ▓▓▓│       │▒▒▒      │   │      ▓▓▓│     two lips in one cell: a copy of the cell each, whose
-//!   │▒▒▒   ▓▓▓│  ──►  │▒▒▒      │ + │      ▓▓▓│     nodes are shared with those copies next door alone
-//!   │▒▒▒   ▓▓▓│       │▒▒▒      │   │      ▓▓▓│     that touch the same lip
+//!   │▒▒▒   ▓▓▓│       │▒▒▒      │   │      ▓▓▓│     two lips in one cell: each gets a copy of the cell,
+//!   │▒▒▒   ▓▓▓│  ──►  │▒▒▒      │ + │      ▓▓▓│     which shares nodes only with those copies of the
+//!   │▒▒▒   ▓▓▓│       │▒▒▒      │   │      ▓▓▓│     next cell that touch the same lip
 //!   └─────────┘       └─────────┘   └─────────┘
 //! ```
 //!
@@ -16,31 +16,31 @@ use std::ops::Range;
 use super::element::{N_NODES, N_VOXELS, NODES, SIDE};
 use super::voxels::{Cell, Fill, Voxels};
 
-/// Voxels with less material are none: they are the sliver that a face leaves beside a voxel's own face, and
-/// would join what is apart.
+/// Least share of material for a voxel to count. Smaller shares are slivers where a face runs beside a
+/// voxel's own face; they would join separate parts.
 const LEAST_SHARE: f32 = 0.05;
 
-/// No component of a cell.
+/// Marks a voxel without a component.
 const NONE: u8 = u8::MAX;
 
-/// A cell's part that hangs together.
+/// Copy of a cell with one connected part of its material.
 pub(super) struct Copy {
     pub cell: Cell,
     pub nodes: [u32; N_NODES],
     pub fills: [Fill; N_VOXELS],
 }
 
-/// All copies of all cells.
+/// All copies of all cells, with their nodes.
 pub(super) struct Cells {
-    /// In the order of their cells.
+    /// Copies in the order of their cells.
     pub copies: Vec<Copy>,
     pub n_nodes: usize,
-    /// Volume of what hangs on nothing, as a share of all.
+    /// Loose share of the volume: material not connected to the largest body.
     pub loose_share: f64,
     first: HashMap<Cell, (u32, [u8; N_VOXELS])>,
 }
 
-/// Which component each voxel of a cell belongs to, and how many there are.
+/// Component of each voxel of a cell, and the number of components.
 fn components(fills: &[Fill; N_VOXELS]) -> ([u8; N_VOXELS], u8) {
     let mut of = [NONE; N_VOXELS];
     let mut n = 0;
@@ -63,7 +63,7 @@ fn components(fills: &[Fill; N_VOXELS]) -> ([u8; N_VOXELS], u8) {
     (of, n)
 }
 
-/// The voxels of the same cell that share a face with voxel `at`.
+/// Voxels of the same cell that share a face with voxel `at`.
 fn neighbors(at: usize) -> impl Iterator<Item = usize> {
     let place = [at % SIDE, at / SIDE % SIDE, at / SIDE / SIDE];
     (0..3).flat_map(move |axis| {
@@ -74,7 +74,8 @@ fn neighbors(at: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The last layer of voxels along an axis, each with the one that it meets in the next cell's first layer.
+/// Pairs of voxels that face each other across a cell border: the last layer along `axis`, and the first
+/// layer of the next cell.
 fn facing(axis: usize) -> impl Iterator<Item = (usize, usize)> {
     let step = SIDE.pow(axis as u32);
     (0..N_VOXELS)
@@ -82,7 +83,8 @@ fn facing(axis: usize) -> impl Iterator<Item = (usize, usize)> {
         .map(move |at| (at, at - (SIDE - 1) * step))
 }
 
-/// The nodes on a cell's far face along an axis, each with the same of the next cell's near face.
+/// Pairs of nodes that coincide: those on a cell's far face along `axis`, and those on the next cell's near
+/// face.
 fn shared(axis: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..N_NODES).filter(move |i| NODES[*i][axis] == 1).map(move |i| {
         let mut near = NODES[i];
@@ -129,7 +131,7 @@ impl Cells {
         cells
     }
 
-    /// Which (copy, node) are one: joined across the faces where voxels of both copies meet.
+    /// Joins the (copy, node) pairs that coincide, across faces where voxels of both copies meet.
     fn joined(&self) -> Vec<u32> {
         let mut parent: Vec<u32> = (0..(self.copies.len() * N_NODES) as u32).collect();
         let shared: [Vec<(usize, usize)>; 3] = std::array::from_fn(|axis| shared(axis).collect());
@@ -162,7 +164,7 @@ impl Cells {
         parent
     }
 
-    /// Numbers the nodes of the largest body and drops what is not part of it: chips of voxels.
+    /// Numbers the nodes of the largest body and drops the rest, which are chips of voxels.
     fn keep_largest(&mut self, parent: &mut [u32]) {
         let n = self.copies.len();
         let mut body: Vec<u32> = (0..n as u32).collect();
@@ -201,7 +203,7 @@ impl Cells {
         self.renumber(&kept);
     }
 
-    /// After some copies are gone: cells know where theirs begin, and voxels which of them is theirs.
+    /// Updates each cell's first copy and its voxels' components after copies were dropped.
     fn renumber(&mut self, kept: &[Option<u32>]) {
         for (first, of) in self.first.values_mut() {
             let old = *first as usize;
@@ -220,7 +222,8 @@ impl Cells {
         }
     }
 
-    /// The copy that has the material of a voxel, by the voxel's number along each axis.
+    /// Copy that has the material of a voxel, given by the voxel's number along each axis. `None` if the
+    /// voxel is empty.
     pub fn copy_at(&self, voxel: [i64; 3]) -> Option<u32> {
         let side = SIDE as i64;
         let cell = voxel.map(|k| k.div_euclid(side) as i32);
@@ -230,7 +233,7 @@ impl Cells {
         (own != NONE).then(|| first + u32::from(own))
     }
 
-    /// The share of material of a voxel.
+    /// Share of material of a voxel, in [0, 1].
     pub fn share_at(&self, voxel: [i64; 3]) -> f64 {
         let side = SIDE as i64;
         let [i, j, k] = voxel.map(|k| k.rem_euclid(side) as usize);

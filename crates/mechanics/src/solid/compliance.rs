@@ -1,41 +1,41 @@
-//! What forces at contacts do to the pieces at all contacts: columns of the compliance, computed when a
-//! contact first bears.
+//! Compliance of the pieces at their contacts: displacements at all contacts by forces at one. Columns are
+//! computed when a contact first carries load.
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
 
 use super::body::{Body, Place};
 
-/// Loads that one thread solves at once; more gain nothing and take memory.
+/// Number of loads that one thread solves at once; more gains nothing and takes memory.
 const AT_ONCE: usize = 24;
 
-/// An end of a contact: a place of a piece.
+/// End of a contact on a part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     pub part: u32,
-    /// Among the ends of that part.
+    /// Index among the ends of that part.
     pub index: u32,
 }
 
-/// A place on a piece where a contact ends.
+/// Place on a piece where a contact ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seat {
     pub place: Place,
     pub at: Vec3,
 }
 
-/// The pieces, where contacts end on them, and the columns of the compliance so far.
+/// Pieces, the seats of their contacts, and the columns of compliance computed so far.
 pub(super) struct Compliance {
     pub bodies: Vec<Body>,
-    /// Of each contact, first and second; `None` is the ground.
+    /// Ends of each contact, first and second; `None` is the ground.
     pub ends: Vec<[Option<End>; 2]>,
-    /// Of each part.
+    /// Seats of each part, by index.
     pub seats: Vec<Vec<Seat>>,
-    /// Of each part and seat: displacement at all seats by 1 N along x, y and z.
+    /// Displacement at all seats of a part by 1 N along x, y and z, by part and seat.
     columns: Vec<Vec<Option<[Vec<Vec3>; 3]>>>,
 }
 
-/// −1 for the first end, 1 for the second.
+/// Sign of an end: −1 for the first, 1 for the second.
 fn sign(side: usize) -> f64 {
     2.0 * side as f64 - 1.0
 }
@@ -56,7 +56,7 @@ impl Compliance {
         (0..2).filter_map(|side| ends[side].map(|end| (sign(side), end)))
     }
 
-    /// Computes the columns of these contacts' ends that are not there yet.
+    /// Computes the missing columns for the ends of these contacts.
     pub fn prepare(&mut self, contacts: impl Iterator<Item = usize>) {
         let mut missing: Vec<Vec<u32>> = vec![Vec::new(); self.bodies.len()];
         for contact in contacts {
@@ -100,7 +100,7 @@ impl Compliance {
             .collect()
     }
 
-    /// Displacement at all seats of a part.
+    /// Displacements at all seats of a part, mm.
     fn at_seats(&self, part: usize, displaced: &[f64]) -> Vec<Vec3> {
         let body = &self.bodies[part];
         self.seats[part]
@@ -109,7 +109,8 @@ impl Compliance {
             .collect()
     }
 
-    /// Second less first at each contact, of displacements of each part's unknowns.
+    /// Relative displacement at each contact, second end minus first, from the displacements of the parts'
+    /// unknowns.
     pub fn between(&self, displaced: &[Vec<f64>]) -> Vec<Vec3> {
         let at: Vec<Vec<Vec3>> = (0..self.bodies.len())
             .map(|part| self.at_seats(part, &displaced[part]))
@@ -126,7 +127,8 @@ impl Compliance {
         (0..self.ends.len()).map(of).collect()
     }
 
-    /// What forces on the contacts' second parts do at all contacts, with frames at rest, mm.
+    /// Relative displacement at all contacts by forces on the contacts' second parts, with frames at rest,
+    /// mm.
     pub fn moved_by(&self, force_n: &[Vec3]) -> Vec<Vec3> {
         let on_seats = self.on_seats(force_n);
         let at: Vec<Vec<Vec3>> = (0..self.bodies.len())
@@ -149,7 +151,7 @@ impl Compliance {
         self.differences(&at)
     }
 
-    /// The contacts' forces on each seat of each part, N.
+    /// Forces of the contacts on each seat of each part, N.
     pub fn on_seats(&self, force_n: &[Vec3]) -> Vec<Vec<Vec3>> {
         let mut on: Vec<Vec<Vec3>> = self.seats.iter().map(|s| vec![Vec3::ZERO; s.len()]).collect();
         for (contact, force) in force_n.iter().enumerate() {
@@ -160,7 +162,7 @@ impl Compliance {
         on
     }
 
-    /// What motions of frames do at a contact, mm.
+    /// Relative displacement at a contact by motions of the frames, mm.
     pub fn by_frames(&self, contact: usize, frames: &[[f64; 6]]) -> Vec3 {
         self.ends_of(contact)
             .map(|(sign, end)| {
@@ -177,7 +179,7 @@ impl Compliance {
     }
 
     /// Writes `C` and, below it, `Gᵀ` for these contacts and directions into the lower triangle of an `n × n`
-    /// matrix by columns.
+    /// column-major matrix.
     pub fn fill(&self, rows: &[(usize, Vec3)], n: usize, values: &mut [f64]) {
         let m = rows.len();
         let ends: Vec<Vec<(f64, End)>> = rows.iter().map(|r| self.ends_of(r.0).collect()).collect();

@@ -1,24 +1,25 @@
-//! The quadratic brick of 20 nodes, and its stiffness voxel by voxel.
+//! Quadratic brick element with 20 nodes, and its stiffness voxel by voxel.
 //!
-//! All cells are equal cubes, so what a voxel of full material adds to the stiffness of its cell is computed
-//! once for each of the [`N_VOXELS`] places and then only weighted. Twenty nodes have all quadratic
-//! polynomials, so a wall bends in one cell as it should, however it lies in it.
+//! All cells are equal cubes. So the stiffness that a full voxel adds to its cell is computed once for each
+//! of the [`N_VOXELS`] positions, and then only weighted. Twenty nodes represent all quadratic polynomials,
+//! so a wall of any orientation bends correctly within one cell.
 
 use shellock_geom::Vec3;
 
 use super::voxels::Fill;
 use crate::Material;
 
-/// Voxels along a cell's edge. Five make voxels of 0.5 mm in cells of 2.5 mm: a wall of 2 mm is four of them.
+/// Number of voxels along a cell's edge. Five give voxels of 0.5 mm in cells of 2.5 mm: a wall of 2 mm is
+/// four of them.
 pub(super) const SIDE: usize = 5;
-/// Voxels of a cell.
+/// Number of voxels in a cell.
 pub(super) const N_VOXELS: usize = SIDE * SIDE * SIDE;
-/// Nodes of a cell.
+/// Number of nodes of a cell.
 pub(super) const N_NODES: usize = 20;
-/// Pairs of nodes, each once.
+/// Number of unordered pairs of nodes, each node with itself included.
 const N_PAIRS: usize = N_NODES * (N_NODES + 1) / 2;
 
-/// Where the nodes are: eight corners, then twelve middles of edges, in [−1, 1]³.
+/// Positions of the nodes in [−1, 1]³: eight corners, then twelve edge midpoints.
 pub(super) const NODES: [[i32; 3]; N_NODES] = [
     [-1, -1, -1],
     [1, -1, -1],
@@ -42,7 +43,7 @@ pub(super) const NODES: [[i32; 3]; N_NODES] = [
     [1, 1, 0],
 ];
 
-/// Values of the shape functions at `xi` in [−1, 1]³; they sum to 1, and reproduce quadratic polynomials.
+/// Values of the shape functions at `xi` in [−1, 1]³. They sum to 1 and reproduce quadratic polynomials.
 pub(super) fn shapes(xi: Vec3) -> [f64; N_NODES] {
     NODES.map(|node| {
         let n = Vec3::from(node.map(f64::from));
@@ -62,7 +63,7 @@ pub(super) fn shapes(xi: Vec3) -> [f64; N_NODES] {
     })
 }
 
-/// Their derivatives by xi.
+/// Derivatives of the shape functions with respect to xi.
 pub(super) fn slopes(xi: Vec3) -> [Vec3; N_NODES] {
     NODES.map(|node| {
         let n = Vec3::from(node.map(f64::from));
@@ -86,16 +87,16 @@ pub(super) fn slopes(xi: Vec3) -> [Vec3; N_NODES] {
     })
 }
 
-/// The middle of voxel `at` in the cell, in [−1, 1]³.
+/// Centre of voxel `at` in the cell, in [−1, 1]³.
 pub(super) fn middle(at: usize) -> Vec3 {
     let of = |k: usize| (2 * k + 1) as f64 / SIDE as f64 - 1.0;
     Vec3::new(of(at % SIDE), of(at / SIDE % SIDE), of(at / SIDE / SIDE))
 }
 
-/// Blocks of the stiffness, three by three, of each pair of nodes i ≤ j, N/mm.
+/// Stiffness blocks, three by three, of all pairs of nodes i ≤ j, N/mm.
 pub(super) type Blocks = [[f64; 9]; N_PAIRS];
 
-/// Stiffness of each voxel of full material, and what else is the same in all cells.
+/// Stiffness of each full voxel, and other quantities that all cells share.
 pub(super) struct Elements {
     pub cell_mm: f64,
     pub lame: [f64; 2],
@@ -118,10 +119,10 @@ impl Elements {
         }
     }
 
-    /// Stiffness of a cell with that material in its voxels, and `void` of the material's stiffness
+    /// Stiffness of a cell with the given fill of its voxels, plus `void` times the material's stiffness
     /// throughout.
     ///
-    /// What a voxel is not full of counts at its middle.
+    /// The material of a partly filled voxel counts at its centroid.
     pub fn stiffness(&self, fills: &[Fill; N_VOXELS], void: f64) -> Box<Blocks> {
         if fills.iter().all(|f| f.share == 1.0) {
             return self.full.clone();
@@ -141,7 +142,7 @@ impl Elements {
     }
 }
 
-/// The middle of the material of voxel `at` in the cell, in [−1, 1]³.
+/// Centroid of the material of voxel `at` in the cell, in [−1, 1]³.
 pub(super) fn centre(at: usize, fill: &Fill) -> Vec3 {
     middle(at) + Vec3::from(fill.middle.map(f64::from)) * (2.0 / SIDE as f64)
 }
@@ -152,12 +153,12 @@ fn add(sum: &mut Blocks, blocks: &Blocks, factor: f64) {
     }
 }
 
-/// The two nodes of each pair, in the order of [`Blocks`].
+/// Pairs of nodes, in the order of [`Blocks`].
 pub(super) fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..N_NODES).flat_map(|j| (0..=j).map(move |i| (i, j)))
 }
 
-/// `∫ Bᵀ D B` over one voxel, by three Gauss points along each axis, which are exact here.
+/// Integrates `Bᵀ D B` over one voxel with three Gauss points along each axis, which is exact here.
 fn voxel(lame: [f64; 2], cell_mm: f64, at: usize) -> Blocks {
     const GAUSS: [(f64, f64); 3] = [
         (-0.774_596_669_241_483_4, 5.0 / 9.0),
@@ -178,7 +179,7 @@ fn voxel(lame: [f64; 2], cell_mm: f64, at: usize) -> Blocks {
     blocks
 }
 
-/// Adds `Bᵀ D B` at one place, times a volume.
+/// Adds `Bᵀ D B` at one point, times a volume.
 fn add_point(blocks: &mut Blocks, [lambda, mu]: [f64; 2], cell_mm: f64, xi: Vec3, volume_mm3: f64) {
     let g = slopes(xi).map(|g| (g * (2.0 / cell_mm)).to_array());
     for ((i, j), block) in pairs().zip(blocks) {
@@ -194,7 +195,7 @@ fn add_point(blocks: &mut Blocks, [lambda, mu]: [f64; 2], cell_mm: f64, xi: Vec3
     }
 }
 
-/// Von Mises stress where the nodes of a cell are displaced by `moved_mm`, MPa.
+/// Von Mises stress at `xi` when the nodes of a cell are displaced by `moved_mm`, MPa.
 pub(super) fn von_mises_mpa(elements: &Elements, moved_mm: &[Vec3; N_NODES], xi: Vec3) -> f64 {
     let [lambda, mu] = elements.lame;
     let g = slopes(xi).map(|g| g * (2.0 / elements.cell_mm));

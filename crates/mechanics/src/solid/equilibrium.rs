@@ -1,17 +1,17 @@
-//! Static equilibrium of elastic pieces that touch: Newton's method on a convex energy.
+//! Static equilibrium of elastic pieces in contact: Newton's method on a convex energy.
 //!
-//! Unknowns are the forces of contacts that answer, and six motions of each piece's frame. With C the
-//! compliance of the pieces at the contacts, G what frames do to them, D the contacts' stiffness and S the
-//! springs of the frames:
+//! The unknowns are the forces of the active contacts, and six motions of each piece's frame. C is the
+//! compliance of the pieces at the contacts, G the motion of the contacts with the frames, D the contacts'
+//! stiffness and S the springs of the frames:
 //!
 //! ```text
-//!   ⎡ C + D⁻¹   G ⎤ ⎡ f ⎤   ⎡ u* + D⁻¹ f* − u₀ ⎤      u₀: what loads alone do at the contacts
-//!   ⎣ Gᵀ       −S ⎦ ⎣ q ⎦ = ⎣ − load on frames ⎦      u*, f*: where the law is made linear
+//!   ⎡ C + D⁻¹   G ⎤ ⎡ f ⎤   ⎡ u* + D⁻¹ f* − u₀ ⎤      u₀: displacement at the contacts by loads alone
+//!   ⎣ Gᵀ       −S ⎦ ⎣ q ⎦ = ⎣ − load on frames ⎦      u*, f*: point at which the law is linearised
 //! ```
 //!
-//! The energy falls along each step, as far as it goes (exact line search), so pieces that start apart find
-//! each other. Without friction, and with friction of given bounds, the energy is convex and the answer
-//! unique. Bounds follow the pressures (Haslinger's fixed point).
+//! Each step goes to the minimum of the energy along it (exact line search), so pieces that start apart find
+//! each other. Without friction, or with friction of given bounds, the energy is convex and the solution
+//! unique. The bounds follow the pressures (Haslinger's fixed point).
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::eliminate_leading;
@@ -22,50 +22,50 @@ use super::SolidError;
 use super::compliance::Compliance;
 use super::laws::{Contact, Grip, answers, force};
 
-/// Newton steps before the contacts are called unsettled.
+/// Greatest number of Newton steps before the contacts count as not converged.
 const MOST_STEPS: usize = 200;
-/// Contacts are first this much softer, so that pieces that start apart find all that stops them at once;
-/// stiff ones are found one by one, in hundreds of steps.
+/// Factors by which contacts are softened at first. Then pieces that start apart find all contacts that stop
+/// them at once; stiff contacts are found one by one, in hundreds of steps.
 const SOFTER: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
-/// Steps with softer contacts, and how right forces must be to go on.
+/// Greatest number of steps with softened contacts, and the force tolerance to go on.
 const SOFT_STEPS: usize = 40;
 const SOFT_SETTLED: f64 = 1e-2;
-/// The same in each round of friction's bounds, after which the next round goes on.
+/// Greatest number of steps in each round of friction bounds, after which the next round begins.
 const STEPS_A_ROUND: usize = 30;
-/// Forces of contacts that are out of their law by this share of the load are right.
+/// Force tolerance: greatest deviation of the contact forces from their law, as a share of the load.
 const SETTLED: f64 = 1e-6;
-/// Rounds of friction's bounds.
+/// Greatest number of rounds of friction bounds.
 const MOST_ROUNDS: usize = 30;
-/// By how much of the load bounds, and forces from their law, may be off with friction.
+/// Tolerance with friction: greatest deviation of bounds and forces from their law, as a share of the load.
 const FRICTION_SETTLED: f64 = 2e-3;
-/// A bound that no force reaches, N: contacts stick.
+/// Friction bound that no force reaches, N, so that contacts stick.
 const STUCK_N: f64 = 1e12;
 
-/// What acts on the pieces.
+/// Loads that act on the pieces.
 pub(super) struct Loads {
-    /// Displacement at each contact's ends by loads alone, with frames at rest, second less first, mm.
+    /// Relative displacement at each contact by loads alone, with frames at rest, second end minus first, mm.
     pub free: Vec<Vec3>,
-    /// Of each piece: forces and moments (over its radius) on its frame, N.
+    /// Forces and moments (over its radius) on each piece's frame, N.
     pub on_frames: Vec<[f64; 6]>,
-    /// Sum of the lengths of all forces, N.
+    /// Sum of the magnitudes of all forces, N.
     pub size_n: f64,
-    /// Springs of each piece's frame, N/mm.
+    /// Stiffness of the springs on each piece's frame, N/mm.
     pub spring: f64,
 }
 
-/// Where all stand.
+/// Contact forces and motions of all pieces.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    /// On the second part of each contact, N.
+    /// Force on the second part of each contact, N.
     pub force: Vec<Vec3>,
-    /// Motions of frames, mm.
+    /// Motions of the frames, mm.
     pub frames: Vec<[f64; 6]>,
-    /// Relative motion at each contact, and what of it the contacts' forces do, mm.
+    /// Relative motion at each contact, and below the part of it due to the contact forces, mm.
     pub by: Vec<Vec3>,
     elastic: Vec<Vec3>,
 }
 
-/// A row of the system: a contact's answer along a direction.
+/// Row of the system: the response of a contact along a direction.
 struct Row {
     contact: usize,
     along: Vec3,
@@ -74,7 +74,7 @@ struct Row {
 }
 
 impl State {
-    /// All at rest, with nothing pressing.
+    /// State at rest, without contact forces.
     pub fn rest(loads: &Loads) -> Self {
         Self {
             force: vec![Vec3::ZERO; loads.free.len()],
@@ -84,7 +84,7 @@ impl State {
         }
     }
 
-    /// The way here from `from`.
+    /// Difference from state `from` to this one.
     fn less(&self, from: &Self) -> Self {
         let less = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| *a - *b).collect();
         let frames = self.frames.iter().zip(&from.frames);
@@ -98,7 +98,7 @@ impl State {
         }
     }
 
-    /// Goes a share of a way.
+    /// Adds `share` times a step.
     fn add(&mut self, step: &Self, share: f64) {
         let add =
             |to: &mut [Vec3], step: &[Vec3]| to.iter_mut().zip(step).for_each(|(x, d)| *x += share * *d);
@@ -110,7 +110,7 @@ impl State {
         }
     }
 
-    /// The same contacts' forces under other loads.
+    /// Keeps the contact forces and frames, and recomputes the motions for other loads.
     pub fn under(&self, loads: &Loads, compliance: &Compliance) -> Self {
         let by = |i: usize| loads.free[i] + self.elastic[i] + compliance.by_frames(i, &self.frames);
         Self {
@@ -120,7 +120,7 @@ impl State {
     }
 }
 
-/// What a load is answered by.
+/// Contacts and loads whose equilibrium is sought.
 pub(super) struct Problem<'a> {
     pub contacts: &'a [Contact],
     pub loads: &'a Loads,
@@ -128,11 +128,11 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Friction's answer, from one without it: where all stand, and how far bounds and forces are from the
-    /// law, as a share of the load.
+    /// Solves with friction, starting from a solution without friction. Returns the state, and the deviation
+    /// of bounds and forces from the law, as a share of the load.
     ///
-    /// First what bears sticks, and then slips as far as it must: from that side Newton's method finds what
-    /// slips in a few steps.
+    /// At first every loaded contact sticks, then it slips as far as it must. From that side Newton's method
+    /// finds the slipping contacts in a few steps.
     pub fn with_friction(
         &self,
         compliance: &mut Compliance,
@@ -167,7 +167,7 @@ impl Problem<'_> {
         Ok((state, off))
     }
 
-    /// Pressure of each contact times the coefficient, N.
+    /// Friction bound of each contact, N: pressure times the coefficient.
     fn bounds<'s>(&'s self, state: &'s State, friction: f64) -> impl Iterator<Item = f64> + 's {
         self.contacts.iter().zip(&state.by).map(move |(contact, by)| {
             let gap = contact.gap_mm + contact.normal.dot(*by);
@@ -179,7 +179,7 @@ impl Problem<'_> {
         })
     }
 
-    /// The answer without friction.
+    /// Solves for the equilibrium without friction.
     pub fn settle(&self, compliance: &mut Compliance, start: State) -> Result<State, SolidError> {
         let free = vec![Grip::default(); self.contacts.len()];
         let mut start = start;
@@ -202,8 +202,8 @@ impl Problem<'_> {
         Ok(state)
     }
 
-    /// At most so many steps towards the least of the energy for given bounds of friction, and how far forces
-    /// still are from their law, as a share of the load.
+    /// Takes at most `most` Newton steps towards the minimum of the energy for given friction bounds. Also
+    /// returns the remaining deviation of the forces from their law, as a share of the load.
     fn stepped(
         &self,
         compliance: &mut Compliance,
@@ -305,7 +305,7 @@ fn solved(
     })
 }
 
-/// Solves with what `eliminate_leading` left of the matrix.
+/// Solves with the factors that `eliminate_leading` left in the matrix.
 fn back_substituted(values: &[f64], n: usize, m: usize, mut x: Vec<f64>) -> Option<Vec<f64>> {
     for j in 0..m {
         let column = &values[n * j..n * (j + 1)];
@@ -327,7 +327,7 @@ fn back_substituted(values: &[f64], n: usize, m: usize, mut x: Vec<f64>) -> Opti
     x.iter().all(|x| x.is_finite()).then_some(x)
 }
 
-/// The energy's slope along a step.
+/// Slope of the energy along a step.
 struct Slope<'a> {
     contacts: &'a [Contact],
     grips: &'a [Grip],
@@ -337,12 +337,12 @@ struct Slope<'a> {
 }
 
 impl Slope<'_> {
-    /// How far to go: to where the energy is least, or to the step's end.
+    /// Step length: to the minimum of the energy, or to the step's end.
     fn length(&self) -> f64 {
         const HALVINGS: usize = 60;
         let linear = self.linear();
         let at = |length: f64| linear[0] + length * linear[1] - self.contacts_give(length);
-        // At the end of a step that meets no kink the slope is zero but for rounding.
+        // A step without a kink ends with zero slope, except for rounding.
         if at(1.0) <= 1e-9 * at(0.0).abs() {
             return 1.0;
         }
@@ -358,7 +358,8 @@ impl Slope<'_> {
         0.5 * (low + high)
     }
 
-    /// What pieces, loads and springs of frames add: at the start, and by length.
+    /// Slope from pieces, loads and frame springs: the value at the start, and the increase per unit of
+    /// length.
     fn linear(&self) -> [f64; 2] {
         let mut sums = [0.0; 2];
         let way = self.step;

@@ -1,25 +1,24 @@
-//! What contacts answer to relative motion: pressure once the gap is closed, friction up to a bound, and
-//! holds in all directions.
+//! Contact laws: pressure once the gap is closed, friction up to a bound, and holds in all directions.
 
 use shellock_geom::Vec3;
 
 use super::touch::Touch;
 
-/// Depth of material whose compression is the compliance of a contact, mm: what a printed face gives before
-/// it bears. A face of 4 mm² under 10 N gives 0.0001 mm.
+/// Depth of material whose compression gives a contact its compliance, mm: how far a printed face yields
+/// before it carries load. A face of 4 mm² under 10 N gives 0.0001 mm.
 const SKIN_MM: f64 = 0.1;
-/// What is left of a contact's stiffness along the way it slips, as a share: it makes the step unique.
+/// Remaining share of a contact's stiffness along its direction of slip; it makes the step unique.
 const SLIP_SHARE: f64 = 1e-6;
 
-/// One contact, between two parts or between a part and the ground.
+/// Contact between two parts, or between a part and the ground.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
-    /// Out of the first end's part into the second's.
+    /// Normal out of the first end's part into the second's.
     pub normal: Vec3,
     pub gap_mm: f64,
-    /// Whether it holds in all directions.
+    /// True if the contact holds in all directions.
     pub is_fast: bool,
-    /// N/mm.
+    /// Stiffness of the contact, N/mm.
     pub stiffness: f64,
 }
 
@@ -34,26 +33,26 @@ impl Contact {
     }
 }
 
-/// Stiffness of a contact of that area, N/mm.
+/// Stiffness of a contact with the given area, N/mm.
 pub(super) fn stiffness(area_mm2: f64, youngs_modulus_mpa: f64) -> f64 {
     youngs_modulus_mpa * area_mm2.max(0.01) / SKIN_MM
 }
 
-/// How much friction a contact has, N, and from where its slip is counted.
+/// Friction bound of a contact, N, and the origin of its slip.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Grip {
     pub bound_n: f64,
     pub origin: Vec3,
 }
 
-/// A direction along which a contact answers: `force = −stiffness · motion + constant`.
+/// Direction along which a contact responds: `force = −stiffness · motion + constant`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
     pub along: Vec3,
     pub stiffness: f64,
 }
 
-/// Force on the second part, N, where it has moved by `by` relative to the first.
+/// Force on the second part, N, after it has moved by `by` relative to the first.
 pub(super) fn force(contact: &Contact, grip: &Grip, by: Vec3) -> Vec3 {
     if contact.is_fast {
         return -contact.stiffness * by;
@@ -68,7 +67,7 @@ pub(super) fn force(contact: &Contact, grip: &Grip, by: Vec3) -> Vec3 {
     pressure - contact.stiffness * slip * (most / slip.length().max(most)).min(1.0)
 }
 
-/// The directions along which it answers at all.
+/// Directions along which the contact responds, with their stiffness.
 pub(super) fn answers(contact: &Contact, grip: &Grip, by: Vec3) -> Vec<Answer> {
     let k = contact.stiffness;
     let along = |along: Vec3, stiffness: f64| Answer { along, stiffness };

@@ -1,4 +1,4 @@
-//! Where stress is looked at in a piece: once in each voxel that is mostly material.
+//! Stress samples of a piece: one in each voxel that is mostly material.
 
 use shellock_geom::Vec3;
 
@@ -6,21 +6,21 @@ use super::body::Body;
 use super::element::{Elements, N_NODES, N_VOXELS, SIDE, von_mises_mpa};
 use crate::volume::StressSample;
 
-/// Least share of material of a voxel that is looked at.
+/// Least share of material for a voxel to be sampled.
 const MOSTLY: f64 = 0.5;
 
-/// A place where stress is looked at.
+/// Point of a piece where stress is sampled.
 pub(super) struct Probe {
     copy: u32,
     xi: Vec3,
     at: Vec3,
     volume_mm3: f64,
-    /// Whether it belongs to a connector.
+    /// True if the point belongs to a connector.
     is_connector: bool,
 }
 
-/// The places of a body: in the middle of full voxels, and on the surface in those that it cuts, where
-/// bending has its largest.
+/// Sample points of a body: at the centre of full voxels, and on the surface in voxels that it cuts, where
+/// bending stress is largest.
 pub(super) fn probes(
     body: &Body,
     elements: &Elements,
@@ -51,7 +51,7 @@ pub(super) fn probes(
     found
 }
 
-/// Unit vector out of the material; zero where it is full all around.
+/// Unit vector out of the material; zero if the voxel's neighbours are all full.
 fn outwards(body: &Body, voxel: [i64; 3]) -> Vec3 {
     let share = |axis: usize, step: i64| {
         let mut at = voxel;
@@ -62,7 +62,7 @@ fn outwards(body: &Body, voxel: [i64; 3]) -> Vec3 {
     slope.normalize_or_zero()
 }
 
-/// Von Mises stress at the probes of walls and of connectors.
+/// Von Mises stress at the sample points of walls and of connectors.
 pub(super) fn samples(
     body: &Body,
     elements: &Elements,

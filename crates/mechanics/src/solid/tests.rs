@@ -4,7 +4,7 @@ use shellock_testkit::plain;
 use super::voxels::voxels;
 use super::*;
 
-/// A box that is turned about the origin, then moved.
+/// Box that is rotated about the origin, then translated.
 fn block(min: Vec3, max: Vec3, turn: Quat, by: Vec3) -> Solid {
     let (points, triangles) = plain::cuboid(min, max);
     let points = points.into_iter().map(|p| turn * p + by).collect();
@@ -19,7 +19,7 @@ fn model(params: &SolidParams, pieces: &[Solid], held: &[Hold]) -> SolidModel {
     SolidModel::new(params, pieces, held, &|_| false, &|| false).unwrap()
 }
 
-/// A turn that lies along no axis.
+/// Rotation that lies along no axis.
 fn aslant() -> Quat {
     Quat::from_axis_angle(Vec3::new(1.0, 2.0, -1.5).normalize(), 0.7)
 }
@@ -46,7 +46,7 @@ fn voxels_have_the_volume_of_what_fills_them_however_it_lies() {
 
 #[test]
 fn a_bar_that_is_pulled_stretches_evenly_in_cells_that_are_cut_to_two_hundredths() {
-    // A bar of a square section that fills no cell, pulled at its ends by forces as a uniform stress has them.
+    // A bar whose square section fills no cell, pulled at its ends by the forces of a uniform stress.
     let bar = upright([0.3, 0.2, 0.0], [4.2, 4.1, 20.0]);
     let mut model = model(&STEEP, &[bar], &[]);
     let mut pushes = Vec::new();
@@ -76,7 +76,7 @@ fn a_bar_that_is_pulled_stretches_evenly_in_cells_that_are_cut_to_two_hundredths
     );
 }
 
-/// Deflection of the tip of a strip of 40 mm × 8 mm × 2 mm over that of beam theory.
+/// Deflection of the tip of a strip of 40 mm × 8 mm × 2 mm, relative to beam theory.
 fn cantilever(turn: Quat, cell_mm: f64) -> f64 {
     let (length, width, thickness) = (40.0, 8.0, 2.0);
     let by = Vec3::new(0.7, 0.9, 1.1);
@@ -166,7 +166,7 @@ fn two_lips_in_one_cell_are_not_bridged() {
     assert!((0.93..1.1).contains(&(apart / (2.0 * one))), "{apart} {one}");
 }
 
-/// A block on a table that is held, the gap between them, and weight and pull on it.
+/// Displacement of a block on a held table: when the play is taken up, and under weight and pull.
 fn on_a_table(gap_mm: f64, weight_n: f64, pull_n: f64, friction: f64) -> [Vec3; 2] {
     let table = upright([-10.0, -10.0, -4.0], [10.0, 10.0, 0.0]);
     let block = upright([-4.0, -4.0, gap_mm], [4.0, 4.0, 6.0]);
@@ -184,7 +184,7 @@ fn on_a_table(gap_mm: f64, weight_n: f64, pull_n: f64, friction: f64) -> [Vec3; 
         force_n: Vec3::new(0.0, 0.0, -weight_n / 4.0),
     };
     let mut pushes = vec![top(3.0, 3.0), top(-3.0, 3.0), top(3.0, -3.0), top(-3.0, -3.0)];
-    // Low, so that it does not tip.
+    // Low, so that the block does not tip.
     for y in [-3.0, 3.0] {
         pushes.push(Push {
             part: 1,
@@ -204,7 +204,7 @@ fn a_gap_closes_by_exactly_the_gap() {
     for gap_mm in [0.0, 0.1, 0.3] {
         let [moved, settled] = on_a_table(gap_mm, 10.0, 0.0, 0.0);
         assert!((settled.z + gap_mm).abs() < 1e-3, "{settled} {gap_mm}");
-        // Then the material gives: 10 N on 64 mm², 2000 MPa, some mm high.
+        // Then the material yields elastically: 10 N on 64 mm², 2000 MPa, some mm high.
         let gives = -gap_mm - moved.z;
         assert!((0.0..2e-3).contains(&gives), "{gives}");
     }
@@ -216,14 +216,14 @@ fn friction_holds_up_to_its_share_of_the_pressure_and_no_further() {
     assert!(held.x < 0.01, "{held}");
     let [slides, _] = on_a_table(0.1, 10.0, 2.2, 0.2);
     assert!(slides.x > 1.0, "{slides}");
-    // Without friction nothing holds it.
+    // Without friction nothing holds the block.
     let [slides, _] = on_a_table(0.1, 10.0, 1.8, 0.0);
     assert!(slides.x > 10.0, "{slides}");
 }
 
 #[test]
 fn a_rigid_motion_costs_nothing_and_a_body_that_is_thrown_is_not_deformed_by_its_frame() {
-    // Pushed in its middle and answered by its own inertia, a bar is pressed as one half pushes the other.
+    // Pushed in its middle and balanced by its own inertia, a bar is compressed as one half pushes the other.
     let bar = block(Vec3::ZERO, Vec3::new(30.0, 5.0, 5.0), aslant(), Vec3::ZERO);
     let mut model = model(&STEEP, &[bar], &[]);
     let place = |x: f64, y: f64, z: f64| aslant() * Vec3::new(x, y, z);

@@ -1,4 +1,4 @@
-//! Where finished pieces face each other, and how far apart they are there.
+//! Places where finished pieces face each other, and the gaps between them.
 
 use std::collections::BTreeMap;
 
@@ -6,44 +6,44 @@ use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh, Vec3};
 
-/// Longest edge of the triangles whose middles are looked at, mm: half of what contacts are apart.
+/// Longest edge of the triangles whose centroids are sampled, mm: half of the distance between contacts.
 const SAMPLE_MM: f64 = 1.0;
-/// Cosine of the angle between faces that press on each other, at most.
+/// Greatest cosine of the angle between the normals of faces that press on each other.
 const OPPOSED: f64 = -0.5;
-/// Cosine between a face's normal and the way to the nearest point, at least: what is nearest round a corner
-/// is not ahead.
+/// Least cosine between a face's normal and the direction to the nearest point. A point nearest round a
+/// corner is not ahead.
 const AHEAD: f64 = 0.7;
-/// Nearer than this, mm, the way to the nearest point is rounding, and says nothing.
+/// Distance below which the direction to the nearest point is only rounding error, mm.
 const AT_ONE_PLACE_MM: f64 = 0.02;
-/// Pieces that overlap by more than this, mm, are meant to: half of the least interference of a press fit.
+/// Overlap above which pieces overlap on purpose, mm: half of the least interference of a press fit.
 /// Coordinates of files are rounded to less than 10⁻⁴ mm.
 const PRESSED_MM: f64 = 0.005;
 
-/// A place where part 1 keeps part 0 from going along the normal once the gap is closed.
+/// Place where part 1 keeps part 0 from moving along the normal once the gap is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
-    /// The part whose face was sampled, and the one that it faces.
+    /// Part whose face was sampled, and the part that it faces.
     pub parts: [u32; 2],
-    /// The place on either part, mm.
+    /// Point on each of the two parts, mm.
     pub at: [Vec3; 2],
     /// Unit normal out of part 0 into part 1.
     pub normal: Vec3,
-    /// How far they are apart, mm, ≥ 0.
+    /// Gap between the two parts, mm, ≥ 0.
     pub gap_mm: f64,
-    /// The face that it stands for, mm².
+    /// Area of the face that the place represents, mm².
     pub area_mm2: f64,
-    /// Whether they are pressed into each other on purpose, and so hold in all directions.
+    /// True if the parts are pressed into each other on purpose, and so hold in all directions.
     pub is_fast: bool,
 }
 
-/// A place of a face: how large, and out of it.
+/// Sample of a face: position, outward normal and area.
 struct Spot {
     at: Vec3,
     normal: Vec3,
     area_mm2: f64,
 }
 
-/// The middles of all triangles, cut up until they are small.
+/// Calls `each` with the centroids of a face's triangles, subdivided until they are small.
 fn spots(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Spot)) {
     let [a, b, c] = mesh.corners(face);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -74,8 +74,8 @@ fn spots(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Spot)) {
     }
 }
 
-/// Where parts face each other within `reach_mm`, one place in each box of `spacing_mm` and way of facing:
-/// the nearest, with the area of all.
+/// Finds places where parts face each other within `reach_mm`: one for each box of `spacing_mm` and facing
+/// direction. Each is the nearest place in its box, with the area of all.
 pub(super) fn touches(parts: &[Solid], reach_mm: f64, spacing_mm: f64) -> Vec<Touch> {
     let trees: Vec<TriangleBvh> = parts.par_iter().map(|p| TriangleBvh::new(p.mesh())).collect();
     let pairs: Vec<[usize; 2]> = (0..parts.len())
@@ -112,7 +112,7 @@ fn between(
             let its = |face: u32| other.area_vector_doubled(face as usize).try_normalize();
             let nearest = tree.nearest(spot.at, reach_mm * reach_mm);
             let beside = nearest.and_then(|hit| facing(&spot, hit.point, its(hit.face)?));
-            // What is nearest may lie beside the place, and something else in front of it.
+            // The nearest point may lie beside the sample, while another face lies in front of it.
             let ahead = || {
                 let (face, far_mm) = tree.first_hit(spot.at, spot.normal, reach_mm)?;
                 facing(&spot, spot.at + far_mm * spot.normal, its(face)?)
@@ -125,7 +125,7 @@ fn between(
                 at: [spot.at, spot.at + gap_mm * normal],
                 normal,
                 gap_mm: gap_mm.max(0.0),
-                // Either part is sampled.
+                // Half of the area, since both parts are sampled.
                 area_mm2: spot.area_mm2 / 2.0,
                 is_fast: gap_mm < -PRESSED_MM,
             };
@@ -145,8 +145,8 @@ fn between(
     boxes.into_values().collect()
 }
 
-/// The common normal, and the gap along it, negative where they overlap; `None` where they do not face each
-/// other.
+/// Common normal of two faces, and the gap along it, negative if they overlap. `None` if they do not face
+/// each other.
 fn facing(spot: &Spot, hit: Vec3, its: Vec3) -> Option<(Vec3, f64)> {
     if spot.normal.dot(its) > OPPOSED {
         return None;
@@ -157,7 +157,7 @@ fn facing(spot: &Spot, hit: Vec3, its: Vec3) -> Option<(Vec3, f64)> {
     is_ahead.then_some((normal, gap_mm))
 }
 
-/// Which of six ways a normal goes.
+/// Index of the nearest of six axis directions of a normal.
 fn way(normal: Vec3) -> i64 {
     let axis = (0..3).fold(0, |best, k| {
         if normal[k].abs() > normal[best].abs() {

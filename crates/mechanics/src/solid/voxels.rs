@@ -1,4 +1,4 @@
-//! How much of each voxel a closed mesh fills: exact crossings of parallel lines with its triangles.
+//! Filled share of each voxel of a closed mesh, from exact crossings of parallel lines with its triangles.
 
 use std::collections::HashMap;
 
@@ -6,38 +6,39 @@ use shellock_geom::{TriMesh, Vec3};
 
 use super::element::{N_VOXELS, SIDE};
 
-/// Lines along z through each voxel, each way. Four by four know a face that stands along the lines to an
-/// eighth of a voxel, 0.06 mm.
+/// Number of lines along z through each voxel, along x and along y. Four by four locate a face parallel to
+/// the lines to an eighth of a voxel, 0.06 mm.
 const LINES: i64 = 4;
 
-/// Where in its square a line goes, as a share of it: not in the middle, and not the same both ways, so that
-/// lines meet no edge of meshes whose coordinates are round numbers.
+/// Position of a line in its square, as a share of its side. It is off-centre and differs between the axes,
+/// so that lines meet no edge of a mesh with round coordinates.
 const OFF_MIDDLE: [f64; 2] = [0.500_137_1, 0.500_271_9];
 
 /// A cell by its number along each axis; cell (0, 0, 0) begins at the origin.
 pub(super) type Cell = [i32; 3];
 
-/// What is filled, cell by cell.
+/// Filled voxels, cell by cell.
 pub(super) struct Voxels {
-    /// The cells with material, ascending.
+    /// Cells with material, in ascending order.
     pub cells: Vec<Cell>,
-    /// What each of a cell's voxels has, x fastest.
+    /// Fill of each cell's voxels, x fastest.
     pub fills: Vec<[Fill; N_VOXELS]>,
 }
 
-/// What a voxel has of material.
+/// Material in a voxel: its share and its centroid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Fill {
-    /// Share of the voxel, in [0, 1].
+    /// Filled share of the voxel, in [0, 1].
     pub share: f32,
-    /// The middle of the material from that of the voxel, in voxels. Without it a wall whose faces lie
-    /// between voxels' is up to 12 % too stiff in bending, for its material counts as if farther out.
+    /// Centroid of the material relative to the voxel's centre, in voxels. Without it, a wall whose faces lie
+    /// inside voxels is up to 12 % too stiff in bending, because its material counts as if farther out.
     pub middle: [f32; 3],
 }
 
-/// What `mesh` fills of the voxels of cells of `cell_mm`: where it winds around a line.
+/// Computes the fill of the voxels, in cells of `cell_mm`: the points around which `mesh` has a positive
+/// winding number.
 ///
-/// Lines along which its crossings do not come out even, as with faces that are missing, count nothing.
+/// Lines whose crossings do not cancel out, as where faces are missing, are skipped.
 pub(super) fn voxels(mesh: &TriMesh, cell_mm: f64) -> Voxels {
     let pitch_mm = cell_mm / SIDE as f64 / LINES as f64;
     let mut crossings = crossings(mesh, pitch_mm);
@@ -78,7 +79,7 @@ pub(super) fn voxels(mesh: &TriMesh, cell_mm: f64) -> Voxels {
     }
     found.sort_by_key(|c| c.0);
     for fill in found.iter_mut().flat_map(|c| c.1.iter_mut()) {
-        // Sums of sixteenths are full but for rounding.
+        // Sums of sixteenths reach 1 except for rounding.
         if fill.share > 0.999 {
             *fill = Fill {
                 share: 1.0,
@@ -92,8 +93,8 @@ pub(super) fn voxels(mesh: &TriMesh, cell_mm: f64) -> Voxels {
     Voxels { cells, fills }
 }
 
-/// Calls `add` with the cell, the voxel, the share and its height from the voxel's middle for each voxel in
-/// column (x, y) that the stretch covers.
+/// Calls `add` for each voxel in column (x, y) that the stretch covers, with the cell, the voxel, the covered
+/// share, and the height of its middle above the voxel's centre.
 fn fill([x, y]: [i64; 2], [from, to]: [f64; 2], cell_mm: f64, mut add: impl FnMut(Cell, usize, f64, f64)) {
     let side = SIDE as i64;
     let (from, to) = (from / cell_mm * SIDE as f64, to / cell_mm * SIDE as f64);
@@ -111,7 +112,7 @@ fn fill([x, y]: [i64; 2], [from, to]: [f64; 2], cell_mm: f64, mut add: impl FnMu
     }
 }
 
-/// Line, height and sense (+1 where it enters, seen upwards) of each crossing.
+/// Line, height and sense (+1 where the upward line enters) of each crossing.
 fn crossings(mesh: &TriMesh, pitch_mm: f64) -> Vec<([i64; 2], f64, i8)> {
     let mut found = Vec::new();
     let line = |k: i64, axis: usize| (k as f64 + OFF_MIDDLE[axis]) * pitch_mm;
@@ -135,7 +136,8 @@ fn crossings(mesh: &TriMesh, pitch_mm: f64) -> Vec<([i64; 2], f64, i8)> {
 }
 
 fn crossing(corners: [Vec3; 3], x: f64, y: f64) -> Option<(f64, i8)> {
-    // Signed area of an edge with the line, the same number but for its sign seen from both of its triangles.
+    // Signed area of an edge with the line. Both triangles of an edge get the same magnitude with opposite
+    // signs.
     let edge = |a: Vec3, b: Vec3| {
         let is_swapped = (a.x, a.y, a.z) > (b.x, b.y, b.z);
         let (p, q) = if is_swapped { (b, a) } else { (a, b) };

@@ -1,5 +1,4 @@
-//! What a plan adds to the parts: contacts between the two sides of a station, and the forces that pull them
-//! apart.
+//! Contacts that a plan adds between the two sides of a station, and the forces that pull them apart.
 
 use shellock_geom::Vec3;
 
@@ -7,44 +6,45 @@ use super::SurfaceModel;
 use super::parts::{Motions, N_MOTIONS};
 use crate::assembly::{Meeting, Side, Station};
 
-/// Contacts of a station, of which a plan may leave some out: always as many, so that all plans have the same
-/// unknowns.
+/// Number of contacts of a station. It is fixed, although a plan may leave some absent, so that all plans
+/// have the same unknowns.
 pub(super) const N_CONTACTS: usize = 5;
 
-/// The place of each among a station's contacts: the walls of both sides;
+/// Index of the contact between the walls of both sides.
 pub(super) const WALL: usize = 0;
-/// the pin's tip and a side of the channel;
+/// Index of the contact between the pin's tip and a side of the channel.
 pub(super) const TIP: usize = 1;
-/// the same at the pin's root;
+/// Index of the contact between the pin's root and a side of the channel.
 pub(super) const ROOT: usize = 2;
-/// the pin's tip and the channel's floor, and what friction holds back besides;
+/// Index of the contact between the pin's tip and the channel's floor; friction on a fast joint also acts
+/// here.
 pub(super) const FLOOR: usize = 3;
-/// what friction holds along the channel.
+/// Index of the friction contact along the channel.
 pub(super) const SLIDE: usize = 4;
 
-/// When a contact bears something.
+/// Condition under which a contact carries load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Law {
-    /// Always.
+    /// Carries load in both directions.
     Both,
-    /// Where it is pressed together.
+    /// Carries load only when pressed together.
     Push,
-    /// Never: there is none.
+    /// Never carries load: the contact is absent.
     Absent,
 }
 
-/// One contact: its energy is `(g · r)²/2` in the motions r of side a from side b, where one-sided only for a
-/// negative sum.
+/// One contact. Its energy is `(g · r)²/2` in the motions r of side a relative to side b; if one-sided, only
+/// for a negative `g · r`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Contact {
     pub station: usize,
-    /// The gap's gradient times the root of the stiffness, N/mm.
+    /// Gradient of the gap times the square root of the stiffness, N/mm.
     pub gradient: Motions,
     pub law: Law,
 }
 
 impl Contact {
-    /// What presses: all of `gap`, or what of it is negative.
+    /// Share of `gap` that stores energy: all of it, or its negative part.
     pub fn pressed(&self, gap: f64) -> f64 {
         match self.law {
             Law::Both => gap,
@@ -53,7 +53,7 @@ impl Contact {
         }
     }
 
-    /// Whether it bears something at `gap`.
+    /// Returns true if the contact carries load at `gap`.
     pub fn is_closed(&self, gap: f64) -> bool {
         match self.law {
             Law::Both => true,
@@ -63,8 +63,8 @@ impl Contact {
     }
 }
 
-/// How side `from` moves from the other one along `g`, both perpendicular to the tangent, at `offset` from
-/// the seam point.
+/// Gap along `g` at `offset` from the seam point, as a linear form of the station's motions: the motion of
+/// side `from` relative to the other side. `g` and `offset` are perpendicular to the tangent.
 pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motions {
     let turned = station.tangent.cross(offset).dot(g);
     let motions = [
@@ -76,8 +76,10 @@ pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motio
     motions.map(|m| if from == Side::A { m } else { -m })
 }
 
-/// The contacts of station `i`. Where there is a connector, neither the tips nor the seam points may part
-/// across the channel, and the male's tip may not go deeper; the walls may not enter each other anywhere.
+/// Contacts of station `i`.
+///
+/// A connector keeps the tips and the seam points together across the channel, and keeps the male's tip from
+/// going deeper. The walls may not enter each other at any station.
 pub(super) fn contacts_at(model: &SurfaceModel, i: usize, meeting: &Meeting) -> [Contact; N_CONTACTS] {
     let station = &model.assembly.stations[i];
     let size_mm = meeting
@@ -105,7 +107,7 @@ pub(super) fn contacts_at(model: &SurfaceModel, i: usize, meeting: &Meeting) -> 
     found
 }
 
-/// The pulls on the tips of side a and, the other way, of side b, as forces on the stations' motions.
+/// Pulls on the tips of side a and, reversed, of side b, as forces on the stations' motions.
 pub(super) fn forces(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Vec<Motions> {
     let mut forces = vec![[0.0; N_MOTIONS]; model.assembly.stations.len()];
     for (((force, station), meeting), pull) in forces

@@ -1,12 +1,12 @@
-//! The forces in contacts: bodies are joined two at a time.
+//! Solver for the contact forces: bodies are joined two at a time.
 //!
 //! ```text
-//!   (W₁ + W₂ + … + 1) μ = b      Wᵢ: how contacts give way because body i does; a contact is between two bodies, so when
-//!                                they are joined its row is complete: it is eliminated, and the two have become one
+//!   (W₁ + W₂ + … + 1) μ = b      Wᵢ: compliance of the contacts due to body i; a contact is between two
+//!                                bodies, so its row is complete when they are joined: then it is eliminated
 //! ```
 //!
-//! Contacts that bear both ways are eliminated once for a plan, whatever loads there are. Those that only push
-//! are kept to the end: what is left is how they give way under each other, a small dense matrix.
+//! Contacts that carry load both ways are eliminated once for each plan, whatever the loads. Contacts that
+//! only push are kept to the end; their compliance under each other's forces is a small dense matrix.
 
 use std::sync::Arc;
 
@@ -14,31 +14,32 @@ use shellock_geom::sparse::{SparseError, eliminate_leading};
 
 use super::contact::Law;
 
-/// What a place of a front costs besides the elimination, for clearing and adding up, in multiplications.
+/// Overhead of an entry of a front besides the elimination, for clearing and adding, in multiplications.
 const COST_OF_PLACE: usize = 30;
 
-/// A body as the contacts feel it.
+/// Body as the contacts see it.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
-    /// The contacts that it touches, ascending.
+    /// Contacts that the body touches, ascending.
     pub contacts: Vec<u32>,
-    /// How each of them opens under forces in the others, by columns; symmetric.
+    /// Opening of each contact under forces in the others, column-major; symmetric.
     pub compliance: Vec<f64>,
 }
 
-/// One joining: contacts that nothing else touches are eliminated, the others are kept.
+/// One joining step. Contacts that no other body touches are eliminated, the others are kept.
 #[derive(Clone, Debug, Default)]
 struct Joining {
     bodies: Vec<usize>,
-    /// Earlier joinings.
+    /// Indices of earlier joinings.
     joined: Vec<usize>,
-    /// Ascending, and all before those kept.
+    /// Eliminated contacts, ascending, all before the kept ones.
     eliminated: Vec<u32>,
-    /// Ascending.
+    /// Kept contacts, in ascending order.
     kept: Vec<u32>,
 }
 
-/// The contacts of a joining and their matrix, the lower triangle by columns; the first ones are eliminated.
+/// Contacts of a joining and their matrix, its lower triangle column-major; the leading contacts are
+/// eliminated.
 #[derive(Clone, Debug, Default)]
 struct Front {
     contacts: Vec<u32>,
@@ -46,25 +47,25 @@ struct Front {
     values: Vec<f64>,
 }
 
-/// All joinings in order.
+/// All joining steps, in order.
 #[derive(Debug, Default)]
 pub(super) struct Joinings {
     joinings: Vec<Joining>,
 }
 
-/// What is left when the contacts that bear both ways are eliminated.
+/// System that remains when the contacts that carry load both ways are eliminated.
 #[derive(Debug)]
 pub(super) struct Reduced {
     fronts: Vec<Arc<Front>>,
-    /// The contacts that only push, ascending.
+    /// Contacts that only push, ascending.
     pub pushes: Vec<u32>,
-    /// How each of them opens under forces in the others, by columns; symmetric.
+    /// Opening of each of them under forces in the others, column-major; symmetric.
     pub compliance: Vec<f64>,
 }
 
 impl Joinings {
-    /// How bodies with these contacts (ascending) are joined, always the two that take the least work next;
-    /// and the order in which the contacts are eliminated. Joinings number them in that order.
+    /// Plans the joining of bodies with these contacts (ascending), always the cheapest pair next. Also
+    /// returns the order in which the contacts are eliminated; joinings number them in that order.
     pub fn new(bodies: Vec<Vec<u32>>, n_contacts: usize) -> (Self, Vec<u32>) {
         let mut n_touching = vec![0; n_contacts];
         bodies.iter().flatten().for_each(|&c| n_touching[c as usize] += 1);
@@ -118,7 +119,8 @@ impl Joinings {
         (Self { joinings }, order)
     }
 
-    /// The same where each contact is `n` that touch the same bodies: contact c becomes those from n c on.
+    /// Expands each contact to `n` contacts that touch the same bodies: contact c becomes contacts n c to n
+    /// (c + 1) − 1.
     pub fn of_groups(mut self, n: u32) -> Self {
         for joining in &mut self.joinings {
             for contacts in [&mut joining.eliminated, &mut joining.kept] {
@@ -128,7 +130,7 @@ impl Joinings {
         self
     }
 
-    /// Joins all bodies. Where some are those of `before`, what was made of them alone is not made again.
+    /// Joins all bodies. Fronts of bodies that are unchanged since `before` are reused.
     pub fn reduce(
         &self,
         bodies: &[Arc<Body>],
@@ -190,8 +192,8 @@ impl Joinings {
 }
 
 impl Reduced {
-    /// Of the gaps of all contacts, those of the pushing ones when the others have closed theirs; what the
-    /// others need for [`finish`](Self::finish) takes the place of their own.
+    /// Eliminates forwards. On return the gaps of the pushing contacts are those left when the others are
+    /// closed. The entries of the others hold intermediate values for [`finish`](Self::finish).
     pub fn begin(&self, gaps: &mut [f64]) {
         for front in &self.fronts {
             let n = front.contacts.len();
@@ -207,8 +209,8 @@ impl Reduced {
         }
     }
 
-    /// From what [`begin`](Self::begin) left, and with what the pushing contacts bear in their places: what
-    /// all bear.
+    /// Substitutes backwards. Takes the intermediate values of [`begin`](Self::begin) and the forces of the
+    /// pushing contacts in their entries; leaves the forces of all contacts.
     pub fn finish(&self, borne: &mut [f64]) {
         for front in self.fronts.iter().rev() {
             let n = front.contacts.len();
@@ -224,12 +226,12 @@ impl Reduced {
     }
 }
 
-/// Work of a joining with a front of `n` contacts of which `n_kept` are kept, in multiplications.
+/// Cost of a joining with a front of `n` contacts of which `n_kept` are kept, in multiplications.
 fn work(n: usize, n_kept: usize) -> usize {
     (n.pow(3) - n_kept.pow(3)) / 3 + COST_OF_PLACE * n.pow(2)
 }
 
-/// Which two bodies that share contacts are joined with the least work.
+/// Finds the two bodies with shared contacts that are cheapest to join.
 fn cheapest_pair(live: &[Joining]) -> Option<[usize; 2]> {
     let n_shared = |x: &[u32], y: &[u32]| x.iter().filter(|c| y.binary_search(c).is_ok()).count();
     let mut best: Option<(usize, [usize; 2])> = None;
@@ -251,7 +253,7 @@ impl Joining {
         self.eliminated.len() + self.kept.len()
     }
 
-    /// Makes `piece` a part of this joining: after it, or together with it where that is less work.
+    /// Makes `piece` a part of this joining: merged with it if that is cheaper, or as an earlier step.
     fn take(&mut self, piece: Self, joinings: &mut Vec<Self>) {
         let (n, n_kept, n_more) = (self.n_contacts(), self.kept.len(), piece.eliminated.len());
         let apart = work(piece.n_contacts(), piece.kept.len()) + work(n, n_kept);
@@ -267,8 +269,8 @@ impl Joining {
 }
 
 impl Front {
-    /// With places for what is eliminated, for what waits for other bodies, and for all that pushes; empty
-    /// but for the 1 of what is eliminated.
+    /// Allocates a front for the eliminated contacts, those that wait for other bodies, and all that push.
+    /// Zero except for a 1 on the diagonal of each eliminated contact.
     fn of(joining: &Joining, bodies: &[Arc<Body>], done: &[Arc<Self>], laws: &[Law]) -> Self {
         let both = |of: &[u32]| {
             let is = |c: &u32| laws[*c as usize] == Law::Both;
@@ -336,7 +338,7 @@ mod tests {
 
     use super::*;
 
-    /// Seven bodies in a ring with a chord, 31 contacts between them and 5 that touch one body alone.
+    /// Seven bodies in a ring with a chord, with 31 contacts between them and 5 that touch one body alone.
     fn ring() -> (Vec<Vec<u32>>, u32) {
         let mut touched = vec![Vec::new(); 7];
         let pairs = (0..7).map(|i| [i, (i + 1) % 7]).chain([[0, 3]]);

@@ -1,10 +1,10 @@
-//! Forces from outside: how far seams open, and how much pins are bent, under many loads on one plan.
+//! External loads: openings of seams and bending of pins, under many loads on one plan.
 //!
-//! A load is a force on every point of the outer surface. What of them does not balance accelerates the whole
-//! as a rigid body, and the inertia of the walls bears it, spread by area (inertia relief). A part's answer to
-//! its own forces, if nothing joined it to others, is one solve with the factor that it has anyway; contacts
-//! then see a load as gaps that are there before they bear anything. Without a clearance contacts open in
-//! proportion to the load: a load twice as large opens twice as far.
+//! A load is a force on every point of the outer surface. Its unbalanced resultant accelerates the whole
+//! assembly as a rigid body and is balanced by the inertia of the walls, spread by area (inertia relief). The
+//! response of a free part to its own forces is one solve with its existing factor. Contacts then see a load
+//! as initial gaps. Without a clearance, openings are proportional to the load: twice the load opens them
+//! twice as far.
 
 use nalgebra::{SMatrix, SVector};
 use shellock_geom::Vec3;
@@ -17,26 +17,26 @@ use super::solve::{Balance, Jointed, Load, openings};
 use crate::assembly::{Meeting, Opening};
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
-/// One load as the stations feel it before anything joins the parts.
+/// One load, given by the motions that it causes at the stations before the parts are joined.
 #[derive(Clone, Debug)]
 pub struct Drift(pub(super) Load);
 
-/// What one load does to a plan.
+/// Response of a plan to one load.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bearing {
     /// Distance between the male and the female at each station, mm; 0 where there is no joint.
     pub opening_mm: Vec<f64>,
-    /// The largest bending stress in the pin of each station, MPa; 0 where there is no joint.
+    /// Largest bending stress in the pin of each station, MPa; 0 where there is no joint.
     pub pin_mpa: Vec<f64>,
     /// Length of each station, mm.
     pub length_mm: Vec<f64>,
-    /// Newton steps that it took.
+    /// Number of Newton steps taken.
     pub n_iterations: usize,
-    /// What is left of the force, as a share of it.
+    /// Residual force, as a share of the force.
     pub error: f64,
 }
 
-/// Which contacts are closed under a load: where to begin with a plan that is nearly the same.
+/// Set of contacts closed under a load, as the starting point for a similar plan.
 #[derive(Clone, Debug, Default)]
 pub struct Closed(Vec<bool>);
 
@@ -46,19 +46,19 @@ impl Closed {
     }
 }
 
-/// The parts joined by a plan. Plans that differ little are made of each other, and loads begin where those of
-/// another plan ended.
+/// Parts joined by a plan. A similar plan can reuse them, and its loads can start from the contacts closed
+/// before.
 #[derive(Clone)]
 pub struct JoinedParts<'a>(Jointed<'a>);
 
 impl JoinedParts<'_> {
-    /// The same parts joined by another plan; those whose seams it leaves alone are not computed again.
+    /// Joins the same parts by another plan. Parts whose seams are unchanged are not computed again.
     pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
         self.0.changed(plan).map(Self)
     }
 
-    /// What `load` does; `plan` is what they are joined by. The answer does not depend on `closed`, but for
-    /// rounding.
+    /// Computes the response to `load`, where `plan` is the plan that joins the parts. The result does not
+    /// depend on `closed`, except for rounding.
     pub fn bear(
         &self,
         plan: &[Meeting],
@@ -70,7 +70,8 @@ impl JoinedParts<'_> {
         Ok((bearing, Closed::of(&balance)))
     }
 
-    /// How far the separation force opens the seams; no part is held, since the pulls of all seams balance.
+    /// Computes the openings under the separation force. No part is held, since the pulls of all seams
+    /// balance.
     pub fn pulled(
         &self,
         plan: &[Meeting],
@@ -83,14 +84,15 @@ impl JoinedParts<'_> {
         Ok((opening, Closed::of(&balance)))
     }
 
-    /// How far each point of the outer surface goes under `forces_n` on all of them, mm: with the middle of the
-    /// wall below it. How the whole moves as a rigid body, in the mean over the area, is left out where no
-    /// points are held: nothing says how far that is.
+    /// Displacement of each point of the outer surface under `forces_n`, mm: that of the mid-wall point below
+    /// it. If no points are held, the mean rigid motion over the area is subtracted, because it is
+    /// undetermined.
     ///
-    /// One solve a part with the factor that it has. The answer does not depend on `closed`, but for rounding.
+    /// Takes one solve a part with its existing factor. The result does not depend on `closed`, except for
+    /// rounding.
     ///
     /// # Panics
-    /// Where there is not one force for each point.
+    /// If the number of forces is not the number of points.
     pub fn moved_mm(&self, forces_n: &[Vec3], closed: Option<&Closed>) -> Result<Vec<Vec3>, SparseError> {
         let model = self.0.model;
         let load = model.drift(forces_n).0;
@@ -111,11 +113,11 @@ impl JoinedParts<'_> {
 }
 
 impl SurfaceModel {
-    /// What `forces_n` on the points of the outer surface do; where nothing holds the parts, inertia bears
-    /// what of them does not balance.
+    /// Computes the motions caused by `forces_n` on the points of the outer surface. If no points are held,
+    /// inertia balances the resultant.
     ///
     /// # Panics
-    /// Where there is not one force for each point.
+    /// If the number of forces is not the number of points.
     pub fn drift(&self, forces_n: &[Vec3]) -> Drift {
         let points = mid_wall(&self.params, &self.assembly);
         assert_eq!(forces_n.len(), points.len(), "one force for each point");
@@ -134,7 +136,8 @@ impl SurfaceModel {
         })
     }
 
-    /// What each of `loads` does to the parts joined by `plan`; nothing but the model's held points is held.
+    /// Computes the response of the parts joined by `plan` to each of `loads`. Only the model's held points
+    /// are held.
     pub fn bear(&self, plan: &[Meeting], loads: &[Drift]) -> Result<Vec<Bearing>, SparseError> {
         let joined = self.joined(plan)?;
         loads
@@ -143,7 +146,7 @@ impl SurfaceModel {
             .collect()
     }
 
-    /// The parts joined by `plan`, ready for loads.
+    /// Joins the parts by `plan`, ready for loads.
     pub fn joined(&self, plan: &[Meeting]) -> Result<JoinedParts<'_>, SparseError> {
         Jointed::new(self, &self.free, plan).map(JoinedParts)
     }
@@ -170,7 +173,7 @@ impl SurfaceModel {
         }
     }
 
-    /// The forces, with the walls' inertia where nothing holds the parts.
+    /// Forces plus the inertia forces of the walls, which are added only if no point is held.
     fn balanced(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<Vec3> {
         let mut balanced_n = forces_n.to_vec();
         if self.is_held {
@@ -186,7 +189,7 @@ impl SurfaceModel {
         balanced_n
     }
 
-    /// Takes from motions what of them is the whole's, in the mean over the area.
+    /// Subtracts the mean rigid motion over the area from the displacements.
     fn without_whole(&self, points: &[Vec3], moved_mm: &mut [Vec3]) {
         let areas_mm2 = self.assembly.point_areas_mm2();
         let whole = Whole::new(points, &areas_mm2);
@@ -199,10 +202,10 @@ impl SurfaceModel {
     }
 }
 
-/// All walls as one rigid body, their mass that of their area.
+/// All walls as one rigid body with mass proportional to area.
 struct Whole {
     center: Vec3,
-    /// Against [`Self::modes`], mm² and mm² times arms.
+    /// Inertia matrix in terms of [`Self::modes`], mm² and mm² times arms.
     inertia: SMatrix<f64, 6, 6>,
 }
 
@@ -223,7 +226,7 @@ impl Whole {
         whole
     }
 
-    /// How a point moves with each of three shifts and three turns about the center.
+    /// Displacements of a point under each of three translations and three rotations about the centre.
     fn modes(&self, p: Vec3) -> [Vec3; 6] {
         let arm = p - self.center;
         std::array::from_fn(|j| {
@@ -235,8 +238,8 @@ impl Whole {
         })
     }
 
-    /// The motion with the same work, in its modes, as `pushes` at points: its acceleration under forces. None
-    /// where it is no body.
+    /// Rigid motion with the same work, in its modes, as `pushes` at points: the acceleration under forces.
+    /// Zero if the inertia is singular.
     fn motion(&self, pushes: impl Iterator<Item = (Vec3, Vec3)>) -> SVector<f64, 6> {
         let mut work = SVector::<f64, 6>::zeros();
         for (p, push) in pushes {

@@ -1,8 +1,8 @@
-//! Each part as its seams feel it: the mesh condensed onto four motions of every station.
+//! Parts as seen by their seams: each mesh is condensed onto four motions of every station.
 //!
 //! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q
-//! K⁻¹ Qᵀ`: exact, whatever happens at the seams, and the same for all plans. A part that floats on springs
-//! `G` has its rigid motions `R` besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
+//! K⁻¹ Qᵀ`. This is exact, whatever happens at the seams, and the same for all plans. A part that floats on
+//! springs `G` also has its rigid motions `R`, and then the compliance is `C + R G⁻¹ Rᵀ`.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -13,74 +13,75 @@ use super::SurfaceParams;
 use super::terms::{Root, Term, patch_terms};
 use crate::assembly::{SIDES, ShellAssembly};
 
-/// Motions of a station: along the tangent, along the normal, across, and the turn about the tangent.
+/// Number of motions of a station: along the tangent, along the normal, across, and rotation about the
+/// tangent.
 pub(super) const N_MOTIONS: usize = 4;
 
-/// How side a of a station moves from side b, or what pulls them apart.
+/// Motion of side a of a station relative to side b, or the forces that pull them apart.
 pub(super) type Motions = [f64; N_MOTIONS];
 
-/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what
-/// the weakest joint of a plan that holds resists.
+/// Stiffness, in `E H`, of the springs that tie every point of a floating part to its place. It is 10⁵ times
+/// less than the resistance of the weakest joint of a plan that holds.
 const GROUND_SHARE: f64 = 1e-8;
 
-/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that
-/// they add nothing but rigid motions, and those next to nothing beside the ground's.
+/// Stiffness of the six supports of a floating part, in `E H`. They are statically determinate, so they add
+/// only rigid motions, which are negligible beside those of the ground springs.
 const SUPPORT_SHARE: f64 = 0.1;
 
-/// Length by which rotations are made comparable with shifts, mm: about a piece's radius.
+/// Length that makes rotations comparable with translations, mm: about a piece's radius.
 const RADIUS_MM: f64 = 30.0;
 
-/// Compliance that every motion has besides the mesh's, in those of a contact a mm long. Parts of a few
-/// triangles have fewer motions than their stations ask for.
+/// Least compliance of every motion, added to the mesh's, as a share of that of a contact one mm long. Parts
+/// of a few triangles have fewer motions than their stations need.
 const LEAST_COMPLIANCE: f64 = 1e-3;
 
-/// The gradient of a motion at the part's points.
+/// Gradient of a motion at the part's points.
 type Gradient = Vec<(u32, Vec3)>;
 
-/// A part as its seams feel it.
+/// Part as its seams see it.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// The stations at which it is a side, ascending.
+    /// Stations at which the part is a side, ascending.
     pub stations: Vec<u32>,
-    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart:
-    /// mm/N (1/N for a turn, 1/N mm for two). What the other sides' parts add is not in it.
+    /// Motion of side a relative to side b at each station, in [`N_MOTIONS`], under forces that pull them
+    /// apart: mm/N (1/N for one rotation, 1/N mm for two). The parts on the other sides add their own.
     pub compliance: DMatrix<f64>,
     inside: Inside,
 }
 
-/// What is condensed away.
+/// Interior of a part, which is condensed away.
 #[derive(Debug)]
 struct Inside {
-    /// The mesh on its supports.
+    /// Factorised stiffness of the mesh on its supports.
     factor: Cholesky,
-    /// The part's points that may move, ascending, with the row of their x.
+    /// Points of the part that may move, ascending, with the row of their x displacement.
     rows: Vec<(u32, u32)>,
-    /// The stations' motions, as the part's points see them.
+    /// Gradients of the stations' motions at the part's points.
     gradients: Vec<Gradient>,
     floating: Option<Floating>,
 }
 
-/// A part that nothing holds.
+/// Part without held points, on ground springs.
 #[derive(Debug)]
 struct Floating {
-    /// The stations' motions when the part moves as a rigid body.
+    /// Motions of the stations when the part moves as a rigid body.
     rigid: DMatrix<f64>,
-    /// Stiffness of the ground, N/mm.
+    /// Stiffness of the ground springs, N/mm.
     ground_n_mm: f64,
 }
 
-/// What every motion gives way by besides the mesh, mm/N.
+/// Least compliance of every motion, mm/N, added to the mesh's.
 pub(super) fn least_compliance(params: &SurfaceParams) -> f64 {
     LEAST_COMPLIANCE / params.contact_n_mm(params.connector_mm, 1.0)
 }
 
-/// The points of the outer surface, moved to the middle of the wall.
+/// Points of the outer surface, moved to mid-wall.
 pub(super) fn mid_wall(params: &SurfaceParams, assembly: &ShellAssembly) -> Vec<Vec3> {
     let points = assembly.points.iter().zip(&assembly.normals);
     points.map(|(p, n)| *p - 0.5 * params.wall_mm * *n).collect()
 }
 
-/// All parts; points with `is_held` do not move.
+/// Builds all parts; points with `is_held` do not move.
 pub(super) fn parts(
     params: &SurfaceParams,
     assembly: &ShellAssembly,
@@ -122,8 +123,8 @@ pub(super) fn parts(
         .collect()
 }
 
-/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one
-/// beside the two.
+/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, and
+/// one at the point farthest from the line through both.
 fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> {
     let at = |v: u32| points[v as usize];
     let farthest = |distance: &dyn Fn(u32) -> f64| {
@@ -148,7 +149,7 @@ fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> 
     .to_vec()
 }
 
-/// The row of each point's x within its part; `None` where it is held.
+/// Row of each point's x displacement within its part; `None` for a held point.
 fn rows_by_part(assembly: &ShellAssembly, is_held: &[bool]) -> Vec<Option<u32>> {
     let mut n_rows = vec![0; assembly.n_parts];
     let row = |(&part, &is_held): (&u32, &bool)| {
@@ -220,8 +221,8 @@ fn part(
 }
 
 impl Part {
-    /// How side a moves from side b at each of the part's stations under `forces_n` on all points of the
-    /// assembly at mid-wall, where nothing else but the ground holds the part.
+    /// Motion of side a relative to side b at each of the part's stations, under `forces_n` on all points of
+    /// the assembly at mid-wall. Only the ground springs or the held points hold the part.
     pub fn drift(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<f64> {
         let Inside {
             factor,
@@ -254,8 +255,8 @@ impl Part {
         drift
     }
 
-    /// How far each of the part's points that may move goes, mm, under `forces_n` on all points of the
-    /// assembly at mid-wall and what is `sent` between the sides of all stations.
+    /// Displacement of each free point of the part, mm, under `forces_n` on all points of the assembly at
+    /// mid-wall and the forces `sent` between the sides of all stations.
     pub fn moved(&self, points: &[Vec3], forces_n: &[Vec3], sent: &[Motions]) -> Vec<(u32, Vec3)> {
         let Inside {
             factor,
@@ -290,13 +291,13 @@ impl Part {
 }
 
 impl Inside {
-    /// The place of a point among those that may move.
+    /// Index of a point among those that may move.
     fn place_of(&self, point: u32) -> Option<usize> {
         self.rows.binary_search_by_key(&point, |r| r.0).ok()
     }
 }
 
-/// What a motion's gradient sees of rigid motion `j`.
+/// Value of a motion's linear form for rigid motion `j`.
 fn rigid_motion(points: &[Vec3], gradient: &[(u32, Vec3)], j: usize) -> f64 {
     gradient
         .iter()
@@ -304,7 +305,8 @@ fn rigid_motion(points: &[Vec3], gradient: &[(u32, Vec3)], j: usize) -> f64 {
         .sum()
 }
 
-/// Where rigid motion `j` takes a point: a shift, or a turn about an axis through the origin.
+/// Displacement of a point by rigid motion `j`: a translation, or a rotation about an axis through the
+/// origin.
 fn rigid_mode(point: Vec3, j: usize) -> Vec3 {
     let axis = Vec3::AXES[j % 3];
     if j < 3 {
@@ -319,7 +321,7 @@ fn mesh_stiffness<'a>(
     row: &[Option<u32>],
     terms: impl Iterator<Item = &'a Term>,
 ) -> SparseSymmetric {
-    // A point of no triangle, if there is one, has no stiffness of its own.
+    // A point without triangles, if there is one, has no stiffness of its own.
     let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|r| (r, r, f64::MIN_POSITIVE)).collect();
     for term in terms {
         let free = |&(p, g): &(u32, Vec3)| row[p as usize].map(|r| (r, g));

@@ -1,8 +1,9 @@
-//! One plan's equilibrium: Newton's method with an exact line search on a convex, piecewise quadratic energy.
+//! Equilibrium of one plan: Newton's method with an exact line search on a convex, piecewise quadratic
+//! energy.
 //!
-//! The unknowns are the forces in the contacts. With `r = D s` the motions that forces s at the stations
-//! cause, the parts are in balance whatever the contacts bear, `s = f − Gᵀ μ`; what is sought are μ that are
-//! those of the gaps, `μ = (G r)⁻`.
+//! The unknowns are the contact forces μ. `r = D s` are the motions caused by forces s at the stations. With
+//! `s = f − Gᵀ μ` the parts are in balance for any μ. The solution is the μ that matches the gaps: `μ = (G
+//! r)⁻`.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,13 +17,13 @@ use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceParams, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Side, Station};
 
-/// Newton steps of a line search; the slope is piecewise linear and most searches end after two or three.
+/// Newton steps of a line search. The slope is piecewise linear, and most searches end after two or three.
 const LINE_STEPS: usize = 30;
 
-/// Stiffness of what is held, in that of a contact a mm long.
+/// Stiffness of held parts, relative to that of a contact one mm long.
 const HELD_SHARE: f64 = 1e4;
 
-/// The answer to `pulls`, N, on the tips of side a and, the other way, of side b.
+/// Solves for `pulls`, N, on the tips of side a and, reversed, of side b.
 pub(super) fn solve(
     model: &SurfaceModel,
     plan: &[Meeting],
@@ -49,19 +50,19 @@ pub(super) fn solve(
     })
 }
 
-/// What acts on the parts besides the contacts.
+/// Loads on the parts, without the contact forces.
 #[derive(Clone, Debug)]
 pub(super) struct Load {
     /// Forces between the sides of each station.
     pub sent: Vec<Motions>,
-    /// How side a would move from side b at each station by other forces, if nothing joined the parts, mm.
+    /// Motion of side a relative to side b at each station by other forces if nothing joined the parts, mm.
     pub drift: Vec<Motions>,
-    /// The force beside which what is left of it counts, N.
+    /// Force to which the residual is compared, N.
     pub scale_n: f64,
 }
 
 impl Load {
-    /// Pulls on the tips of side a and, the other way, of side b, N.
+    /// Load of pulls on the tips of side a and, reversed, of side b, N.
     pub fn of_pulls(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Self {
         let sent = forces(model, plan, pulls);
         Self {
@@ -72,16 +73,16 @@ impl Load {
     }
 }
 
-/// What all plans have in common that hold the same parts: which parts feel which stations, and in which
-/// order contacts are eliminated.
+/// Data shared by all plans that hold the same parts: the stations of each part, and the order in which
+/// contacts are eliminated.
 #[derive(Debug)]
 pub(super) struct Layout {
     is_held: Vec<bool>,
     touched: Vec<Touched>,
     joinings: Joinings,
-    /// The place of each station in the order of elimination; its contacts are N_CONTACTS in a row.
+    /// Rank of each station in the elimination order; its N_CONTACTS contacts follow each other.
     rank: Vec<usize>,
-    /// Compliance that held parts add at each station, mm/N.
+    /// Compliance that the held parts add at each station, mm/N.
     given: Vec<f64>,
 }
 
@@ -102,29 +103,29 @@ impl Layout {
     }
 }
 
-/// One plan's contacts, and the parts as they feel them: the same for all loads.
+/// Contacts of one plan, and the parts as seen by them: shared by all loads.
 #[derive(Clone)]
 pub(super) struct Jointed<'a> {
     pub model: &'a SurfaceModel,
     layout: &'a Layout,
-    /// In the order in which they are eliminated.
+    /// Contacts, in the order in which they are eliminated.
     pub contacts: Vec<Contact>,
     bodies: Vec<Arc<Body>>,
     reduced: Arc<Reduced>,
 }
 
-/// The state of least energy under a load.
+/// State of least energy under a load.
 #[derive(Clone, Debug)]
 pub(super) struct Balance {
-    /// How side a moves from side b at each station.
+    /// Motion of side a relative to side b at each station.
     pub moved: Vec<Motions>,
-    /// What each contact bears, in the root of its stiffness times mm.
+    /// Force of each contact, in the square root of its stiffness times mm.
     pub borne: Vec<f64>,
-    /// Forces between the sides of each station, those of the contacts included.
+    /// Forces between the sides of each station, including those of the contacts.
     pub sent: Vec<Motions>,
-    /// Newton steps.
+    /// Number of Newton steps taken.
     pub n_iterations: usize,
-    /// What is left of the force, as a share of it.
+    /// Residual force, as a share of the force.
     pub error: f64,
 }
 
@@ -137,7 +138,7 @@ impl<'a> Jointed<'a> {
         Self::of(model, layout, contacts, bodies, None)
     }
 
-    /// Another plan: parts whose contacts are the same are not computed again.
+    /// Joins by another plan; parts whose contacts are unchanged are not computed again.
     pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
         let contacts = contacts(self.model, self.layout, plan);
         let is_same = |s: &u32| {
@@ -174,8 +175,9 @@ impl<'a> Jointed<'a> {
         })
     }
 
-    /// The balance under `load`, sought from the contacts that are closed at first; without them from all
-    /// one-sided ones open, which takes three steps fewer than all closed.
+    /// Solves for the balance under `load`, starting from the contacts in `closed`. Without `closed`, all
+    /// contacts that only push start by the sign of their gap, which takes three steps fewer than starting
+    /// with all closed.
     pub fn balance(&self, load: &Load, closed: Option<&[bool]>) -> Result<Balance, SparseError> {
         let Self {
             model,
@@ -227,13 +229,13 @@ impl<'a> Jointed<'a> {
     }
 }
 
-/// The places of a station's contacts among all.
+/// Range of a station's contacts in the elimination order.
 fn own_contacts(layout: &Layout, station: u32) -> Range<usize> {
     let first = N_CONTACTS * layout.rank[station as usize];
     first..first + N_CONTACTS
 }
 
-/// The contacts of a plan in the order in which they are eliminated.
+/// Contacts of a plan, in the order in which they are eliminated.
 fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<Contact> {
     let mut contacts: Vec<Option<Contact>> = vec![None; N_CONTACTS * plan.len()];
     for (i, meeting) in plan.iter().enumerate() {
@@ -249,9 +251,9 @@ fn added(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
     motions
 }
 
-/// What contacts must bear more for the balance of the closed ones; `compliance` is how they give way under
-/// each other. Only differences from it are solved for, since rounding is in proportion to what the ground
-/// bears, and that is soft.
+/// Changes of the contact forces that balance the closed contacts; `compliance` relates the contacts to each
+/// other. It solves for differences only, since rounding errors are in proportion to the force that the soft
+/// ground springs take.
 fn step(
     compliance: &[f64],
     is_closed: &[bool],
@@ -266,7 +268,7 @@ fn step(
         .collect();
     let opened = opened(compliance, &step);
     let closed: Vec<usize> = (0..n).filter(|i| is_closed[*i]).collect();
-    // The lower triangle by columns, with the right-hand side as the last row.
+    // The lower triangle is column-major, with the right-hand side as the last row.
     let m = closed.len() + 1;
     let mut values = vec![0.0; m * m];
     for (j, &column) in closed.iter().enumerate() {
@@ -292,8 +294,7 @@ fn step(
     Ok(step)
 }
 
-/// The length of step with the least energy, from what contacts bear and their gaps, and what the step
-/// changes in both.
+/// Step length with the least energy, from the contact forces and gaps, and the changes of both by the step.
 fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f64]; 2]) -> f64 {
     let (mut length, mut first) = (0.0, None);
     for _ in 0..LINE_STEPS {
@@ -314,12 +315,12 @@ fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f
     length
 }
 
-/// Compliance of what is held, mm/N.
+/// Compliance of a held part, mm/N.
 pub(super) fn held_compliance(params: &SurfaceParams) -> f64 {
     1.0 / (HELD_SHARE * params.contact_n_mm(params.connector_mm, 1.0))
 }
 
-/// How side a moves from side b at each station under forces that pull them apart.
+/// Motion of side a relative to side b at each station under forces that pull them apart.
 pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions]) -> Vec<Motions> {
     let mut moved = vec![[0.0; N_MOTIONS]; forces.len()];
     for (i, part) in model.parts.iter().enumerate() {
@@ -350,7 +351,7 @@ pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions])
     moved
 }
 
-/// What a plan's contacts touch: a free part, or a station between held parts alone.
+/// Body that a plan's contacts touch: a free part, or a station between held parts only.
 #[derive(Debug)]
 struct Touched {
     stations: Vec<u32>,
@@ -379,7 +380,7 @@ fn touched(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> 
     touched
 }
 
-/// Compliance that held parts add at each station, mm/N.
+/// Compliance that the held parts add at each station, mm/N.
 fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Vec<f64> {
     let mut given = vec![0.0; n_stations];
     for (part, _) in parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
@@ -388,10 +389,10 @@ fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) ->
     given
 }
 
-/// How the contacts feel a body, with what held parts add.
+/// Body as seen by the contacts, with the compliance that held parts add.
 fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Contact]) -> Body {
     let n = N_MOTIONS * touched.stations.len();
-    // In the order of the contacts, with the place of each station in the part.
+    // Stations in the order of the contacts, with the offset of each station in the part.
     let mut stations: Vec<(Range<usize>, usize)> = touched
         .stations
         .iter()
@@ -436,7 +437,7 @@ fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Co
     }
 }
 
-/// How gaps change when contacts bear `borne` more.
+/// Changes of the gaps when the contact forces grow by `borne`.
 fn opened(compliance: &[f64], borne: &[f64]) -> Vec<f64> {
     let n = borne.len();
     let mut opened = vec![0.0; n];
@@ -455,7 +456,7 @@ fn gaps(contacts: &[Contact], moved: &[Motions]) -> Vec<f64> {
         .collect()
 }
 
-/// `force` without what the contacts bear.
+/// Subtracts the contact forces from `force`.
 fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Motions> {
     contacts
         .iter()
@@ -464,7 +465,7 @@ fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Mot
     force
 }
 
-/// The distances between the tips of both sides, mm; 0 where there is no joint.
+/// Distances between the tips of both sides, mm; 0 where there is no joint.
 pub(super) fn openings(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Vec<f64> {
     let opening = |((station, m), moved): ((&Station, &Meeting), &Motions)| {
         let Some(joint) = m.joint else { return 0.0 };

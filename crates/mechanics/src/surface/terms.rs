@@ -5,12 +5,12 @@ use shellock_geom::Vec3;
 use super::SurfaceParams;
 use crate::assembly::ShellAssembly;
 
-/// One constraint, to first order in the displacements.
+/// One constraint, linearised in the displacements.
 #[derive(Clone, Debug)]
 pub(super) struct Term {
-    /// The points it depends on, each once, with the gradient there.
+    /// Points that the constraint depends on, each once, with its gradient there.
     pub corners: Vec<(u32, Vec3)>,
-    /// N/mm for lengths, N mm for angles.
+    /// Stiffness: N/mm for lengths, N mm for angles.
     pub stiffness: f64,
 }
 
@@ -23,13 +23,13 @@ impl Term {
     }
 }
 
-/// Bending stiffness of a plate of that thickness, N mm.
+/// Bending stiffness of a plate of thickness `thickness_mm`, N mm.
 pub(super) fn bending(params: &SurfaceParams, thickness_mm: f64) -> f64 {
     let m = &params.material;
     m.youngs_modulus_mpa * thickness_mm.powi(3) / (12.0 * (1.0 - m.poissons_ratio.powi(2)))
 }
 
-/// Resistance of an edge against stretch, with half of the area of the triangles beside it.
+/// Resistance of an edge to stretch; it represents half of the area of the adjacent triangles.
 fn edge(
     params: &SurfaceParams,
     points: &[Vec3],
@@ -44,10 +44,10 @@ fn edge(
     Some(Term::new([(i as u32, -unit), (j as u32, unit)], stiffness))
 }
 
-/// The dihedral angle at the edge `i j` between triangles `i j k` and `j i l`, with the given stiffness, N mm
-/// a radian.
+/// Constraint on the dihedral angle at edge `i j` between triangles `i j k` and `j i l`, with the given
+/// stiffness, N mm a radian. `None` for a degenerate triangle.
 ///
-/// The gradient is that of the exact angle, so rigid motions cost nothing.
+/// The gradient is that of the exact angle, so rigid motions cost no energy.
 pub(super) fn hinge(points: &[Vec3], [i, j, k, l]: [usize; 4], stiffness: f64) -> Option<Term> {
     let edge = points[j] - points[i];
     let unit = edge.try_normalize()?;
@@ -71,7 +71,7 @@ pub(super) fn hinge(points: &[Vec3], [i, j, k, l]: [usize; 4], stiffness: f64) -
     Some(Term::new(corners, stiffness))
 }
 
-/// Stretch of all edges and bending of all inner edges of the patches.
+/// Stretch constraints of all edges and bending constraints of all inner edges of the patches.
 pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, points: &[Vec3]) -> Vec<Term> {
     let mut edges: Vec<([usize; 2], usize, f64)> = Vec::with_capacity(3 * assembly.triangles.len());
     for t in &assembly.triangles {
@@ -97,18 +97,18 @@ pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, poin
     terms
 }
 
-/// How a point of a rigid strip moves with the patch at its seam point: with the point, and about it as the
-/// mean of the triangles there turns.
+/// Motion of a point of a rigid strip, linear in the motion of the patch at its seam point: the strip moves
+/// with that point and turns with the mean rotation of its triangles.
 #[derive(Clone, Debug)]
 pub(super) struct Root {
     point: u32,
-    /// `r` and `n` of each corner: the rotation is `Σ −r (n · u) + n (r · u) / 2`, the latter within the
+    /// Vectors `r` and `n` of each corner: the rotation is `Σ −r (n · u) + n (r · u) / 2`, the latter in the
     /// surface.
     turns: Vec<(u32, [Vec3; 2])>,
 }
 
 impl Root {
-    /// Of seam point `point`, at which these triangles meet.
+    /// Root at seam point `point`, where these triangles meet.
     pub fn new(points: &[Vec3], point: u32, triangles: impl Iterator<Item = [u32; 3]> + Clone) -> Self {
         let doubled = |t: [u32; 3]| {
             let [a, b, c] = t.map(|v| points[v as usize]);

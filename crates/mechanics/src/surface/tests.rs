@@ -16,7 +16,7 @@ fn plates(params: &SurfaceParams) -> SurfaceModel {
     SurfaceModel::with_held_points(params, &two_plates(N, ROWS, 5.0), &outer_ring(N, ROWS)).unwrap()
 }
 
-/// Joints of side a as the male, leaving along `leaves`, pulled along `pull`.
+/// Joints with side a as the male, leaving along `leaves`, pulled along `pull`.
 fn joints(leaves: Vec3, pull: Vec3) -> Vec<Meeting> {
     let joint = Joint {
         male: Side::A,
@@ -93,7 +93,7 @@ fn plate_stiffness(params: &SurfaceParams) -> f64 {
     m.youngs_modulus_mpa * params.wall_mm.powi(3) / (12.0 * (1.0 - m.poissons_ratio.powi(2)))
 }
 
-/// `D κ²/2` per area, without the half cells at both ends, beyond whose last edges nothing bends.
+/// Energy is `D κ²/2` per area, without the half cells at both ends, beyond whose last edges nothing bends.
 #[test]
 fn a_plate_bent_to_a_cylinder_costs_its_bending_stiffness() {
     let params = SurfaceParams::default();
@@ -113,9 +113,10 @@ fn a_plate_bent_to_a_cylinder_costs_its_bending_stiffness() {
     );
 }
 
-/// A plate of 95 × 20 mm beyond its clamp, pushed at its end: `F L³/3 D b`, by two theorems of minimum
-/// energy. It yields at least as a cylinder would, which bends at the edges across alone; and at most 5/4 of
-/// that, as separate rows of squares, whose diagonals then have half of the moment² at twice the stiffness.
+/// Deflection of a plate of 95 × 20 mm beyond its clamp, pushed at its end: `F L³/3 D b`, by two theorems of
+/// minimum energy. The plate yields at least as a cylinder would, which bends only at the edges across. It
+/// yields at most 5/4 of that, as separate rows of squares, whose diagonals then have half of the moment² at
+/// twice the stiffness.
 #[test]
 fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
     const N_CELLS: usize = 20;
@@ -139,7 +140,7 @@ fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
         .filter(|row| is_held(row / 3))
         .for_each(|row| stiffness[(row, row)] = 1.0);
     let end: Vec<usize> = (0..n).filter(|v| strip.points[*v].x > 49.9).collect();
-    // The outer rows' ends bear half.
+    // The ends of the outer rows carry half of the load.
     let mut force = DVector::zeros(3 * n);
     for &v in &end {
         let share = if [0.0, width_mm].contains(&strip.points[v].y.abs()) {
@@ -158,7 +159,7 @@ fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
     assert!((1.0..1.25).contains(&ratio), "{ratio} of {cylinder_mm} mm");
 }
 
-/// Pins pulled straight out: a wall across their way is the only thing in it, and only where it is on that
+/// Pins are pulled straight out: a wall across their way is the only obstacle, and only if it is on that
 /// side.
 #[test]
 fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
@@ -172,7 +173,7 @@ fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
     };
     let (open, blocked) = (opened(-Vec3::Z), opened(Vec3::Z));
     assert!(open > 1e-3 && blocked < 0.1 * open, "{blocked} mm of {open} mm");
-    // What nothing presses on bears nothing: as if the wall stood across another way.
+    // A wall without pressure carries nothing: as if it stood across another way.
     assert!(
         (opened(Vec3::Y) / open - 1.0).abs() < 1e-2,
         "{} mm, {open} mm",
@@ -242,7 +243,7 @@ fn forces_are_in_balance_and_a_finer_tolerance_changes_nothing() {
     assert!((opening(&coarse) / opening(&fine) - 1.0).abs() < 1e-3);
 }
 
-/// Stiffness of all parts together against how side a moves from side b, station by station.
+/// Stiffness of all parts together against motions of side a relative to side b, station by station.
 fn stiffness(model: &SurfaceModel) -> DMatrix<f64> {
     let n_stations = model.assembly.stations.len();
     let columns: Vec<DVector<f64>> = (0..N_MOTIONS * n_stations)
@@ -365,7 +366,7 @@ fn twisting(model: &SurfaceModel) -> Vec<Vec3> {
         .collect()
 }
 
-/// What the stations' motions are by how far points went.
+/// Motions of the stations, computed from the displacements of the points.
 fn moved_at_stations(model: &SurfaceModel, moved_mm: &[Vec3]) -> Vec<Motions> {
     let points = parts::mid_wall(&model.params, &model.assembly);
     let triangles_at = |point: u32| {
@@ -396,7 +397,7 @@ fn moved_at_stations(model: &SurfaceModel, moved_mm: &[Vec3]) -> Vec<Motions> {
     model.assembly.stations.iter().map(motions).collect()
 }
 
-/// But for the compliance that parts have besides the mesh's, a thousandth of a contact's.
+/// Deviations are due to the compliance that parts have besides the mesh's, a thousandth of a contact's.
 #[test]
 fn points_move_as_the_stations_that_the_balance_is_of() {
     let params = SurfaceParams::default();
@@ -404,7 +405,7 @@ fn points_move_as_the_stations_that_the_balance_is_of() {
         SurfaceModel::with_held_points(&params, &two_plates(N, ROWS, 5.0), &outer_ring(N, ROWS)).unwrap();
     let free = SurfaceModel::new(&params, &two_plates(N, ROWS, 5.0)).unwrap();
     let mut plan = joints(Vec3::Z, Vec3::Z);
-    // One that holds both plates, so that neither drifts.
+    // A plan that holds both plates, so that neither drifts.
     plan.iter_mut()
         .filter_map(|m| m.joint.as_mut())
         .for_each(|joint| joint.is_fast = true);
@@ -422,7 +423,7 @@ fn points_move_as_the_stations_that_the_balance_is_of() {
         let least = parts::least_compliance(&model.params);
         for ((found, expected), sent) in found.iter().zip(&balance.moved).zip(&balance.sent) {
             for i in 0..N_MOTIONS {
-                // Both sides have it.
+                // Both sides have that compliance.
                 let difference = found[i] + 2.0 * least * sent[i] - expected[i];
                 assert!(difference.abs() < 1e-8 * largest, "{found:?} {expected:?}");
             }

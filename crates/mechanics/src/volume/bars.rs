@@ -1,4 +1,4 @@
-//! Which stations of a model are joined by one bar.
+//! Bars of a plan: which stations each of them joins.
 
 use shellock_geom::Vec3;
 
@@ -6,10 +6,10 @@ use super::VolumeModel;
 use super::connector::{Bar, Section, tets_between};
 use crate::{Meeting, SIDES};
 
-/// Both sides' cross-sections at each station, where it is joined.
+/// Cross-sections of both sides at each station; `None` where it is not joined.
 pub(super) type Sections = Vec<[Option<Section>; 2]>;
 
-/// All of them for a plan.
+/// Computes the cross-sections of all stations for a plan.
 pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
     use rayon::prelude::*;
     (plan.par_iter().enumerate())
@@ -23,8 +23,10 @@ pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
         .collect()
 }
 
-/// The bars of both sides. Every joint has two on either side: towards a neighbour that is joined alike the
-/// two share one; towards any other, and where the seam ends, it has its own, which ends halfway.
+/// Lists the bars of both sides.
+///
+/// Every joint has two bars on each side. It shares one with a neighbour that is joined alike. Towards any
+/// other neighbour, and at the end of the seam, it has a bar of its own, which ends halfway.
 pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -> Vec<Bar> {
     let mut bars = Bars {
         model,
@@ -76,7 +78,7 @@ pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -
     bars.all
 }
 
-/// From a station along its tangent or against it, half as far as the next station.
+/// Half a step from a station to the next, along its tangent or against it.
 #[derive(Clone, Copy)]
 struct Way {
     station: usize,
@@ -84,7 +86,7 @@ struct Way {
     half_mm: f64,
 }
 
-/// The ways from both ends of a step towards each other.
+/// Half steps from both ends of a step towards each other.
 fn ways(model: &VolumeModel, [from, to]: [usize; 2]) -> [Way; 2] {
     let step = model.inner_edge[to][0] - model.inner_edge[from][0];
     let way = |station: usize, step: Vec3| Way {
@@ -95,7 +97,7 @@ fn ways(model: &VolumeModel, [from, to]: [usize; 2]) -> [Way; 2] {
     [way(from, step), way(to, -step)]
 }
 
-/// Bars being listed.
+/// List of bars under construction.
 struct Bars<'a> {
     model: &'a VolumeModel,
     plan: &'a [Meeting],
@@ -104,7 +106,7 @@ struct Bars<'a> {
 }
 
 impl Bars<'_> {
-    /// The two bars between two stations, if both are joined and alike.
+    /// Adds the two bars between two stations, if both are joined alike. Returns false otherwise.
     fn push_shared(&mut self, [from, to]: [usize; 2]) -> bool {
         let males = [from, to].map(|s| self.plan[s].joint.map(|joint| joint.male));
         let tets = SIDES.map(|side| {
@@ -126,7 +128,7 @@ impl Bars<'_> {
         true
     }
 
-    /// The two bars of one station alone, if it is joined.
+    /// Adds the two bars of a single station, if it is joined.
     fn push_own(&mut self, way: &Way) {
         let from = way.station;
         let Some(joint) = &self.plan[from].joint else {
@@ -151,8 +153,8 @@ impl Bars<'_> {
     }
 }
 
-/// First and last of a part's bars at each section, station by station and side by side; the first carries
-/// what belongs to the station.
+/// First and last of a part's bars at each section, by station and side. The first carries the contact rows
+/// and load of the station.
 pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
 
 pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {

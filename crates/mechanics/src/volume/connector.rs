@@ -3,14 +3,15 @@
 //! ```text
 //!      n ▲      male's wall         female's wall        in the plane of ŝ and n, at the inner edge o
 //!        │    ······o──────▶ ŝ      o······
-//!        │   front  │ foot                               front: −0.6 D ≤ s ≤ 0, 0.5 D thick; the male's on the side n < 0,
-//!            ┌──────o──────┐                                    the female's on n > 0; both touch along n = 0
-//!            │ pin  │      │                             foot:  0 ≤ s ≤ 0.5 D, where the front alone would hang on the
-//!            └──────┴──────┘                                    edge only, because ŝ lies across the wall
+//!        │   front  │ foot        front: −0.6 D ≤ s ≤ 0, 0.5 D thick; the male's on the side n < 0,
+//!            ┌──────o──────┐             the female's on n > 0; both touch along n = 0
+//!            │ pin  │      │      foot:  0 ≤ s ≤ 0.5 D, where the front alone would hang on the edge
+//!            └──────┴──────┘             only, because ŝ lies across the wall
 //! ```
 //! A corner that lies in the wall of its own side, or in the face s = 0 where there is no foot, moves with
-//! the wall: by linear interpolation in the nearest tetrahedron, continued beyond it, which is exact for
-//! rigid motions. So no angle of ŝ needs another mesh, and bars may overlap the wall they belong to.
+//! the wall. Its motion is interpolated linearly in the nearest tetrahedron, and extrapolated beyond it,
+//! which is exact for rigid motions. So no angle of ŝ needs another mesh, and bars may overlap their own
+//! wall.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
@@ -24,44 +25,44 @@ use super::unknowns::{Labels, Owner};
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 use crate::{Joint, Side};
 
-/// Corners this far outside the wall still count as inside, as a share of D: places on the inner surface are
-/// inside.
+/// Distance outside the wall at which corners still count as inside, as a share of D: points on the inner
+/// surface are inside.
 const SLACK: f64 = 0.05;
-/// Least volume of a tetrahedron of a bar, as a share of a straight one's; below, frames twist too far for a
-/// connector.
+/// Least volume of a tetrahedron of a bar, as a share of a straight one's. Below it, the frames twist too far
+/// for a connector.
 const MIN_VOLUME_SHARE: f64 = 0.1;
 
-/// Places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
+/// Number of places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
 const N_ALONG_S: usize = 5;
 const N_ACROSS: usize = 3;
 pub(super) const N_SECTION: usize = N_ALONG_S * N_ACROSS;
-/// Nodes of the bar between two stations: cross-sections at both and halfway.
+/// Nodes of the bar between two stations: cross-sections at both ends and halfway.
 const N_BAR: usize = 3 * N_SECTION;
 
-/// Motion of a node as a weighted sum of those of kept wall nodes.
+/// Motion of a node as a weighted sum of the motions of kept wall nodes.
 pub(super) type Hold = Vec<(u32, f64)>;
 
-/// One side's cross-section at a station.
+/// Cross-section of one side at a station.
 #[derive(Debug)]
 pub(super) struct Section {
-    /// Corners along s (tip, root, foot), and from the common face across.
+    /// Corners along s (tip, root, foot), and across from the common face.
     at: [[Vec3; 2]; 3],
     hold: [[Option<Hold>; 2]; 3],
     has_foot: bool,
-    /// Directions n, ŝ, u: the same on both sides.
+    /// Directions n, ŝ and u, which are equal on both sides.
     frame: [Vec3; 3],
-    /// 1 for the male, −1 for the female.
+    /// Sign of the side: 1 for the male, −1 for the female.
     sign: f64,
     /// Separation force on the side, N.
     force_n: Vec3,
 }
 
 impl Section {
-    /// Where the pairs are: at the root and at the tip, on the common face.
+    /// Indices along s of the contact pairs on the common face: root and tip.
     const PAIRS: [usize; 2] = [1, 0];
 
-    /// The cross-section of `side` at a station joined by `joint`, or that far along from it: a section
-    /// further on carries no force.
+    /// Cross-section of `side` at a station joined by `joint`, or `along_mm` further along. A section further
+    /// on carries no force.
     pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint, along_mm: f64) -> Self {
         let (place, size) = (&model.stations[station], joint.size_mm);
         let inland = if side == Side::A {
@@ -105,14 +106,14 @@ impl Section {
         }
     }
 
-    /// Directions in which contact acts on this side: row, direction, place.
+    /// Iterates over the contact rows on this side: row, direction, place.
     pub fn rows(&self) -> impl Iterator<Item = (usize, Vec3, Vec3)> {
         Self::PAIRS.into_iter().enumerate().flat_map(move |(pair, is)| {
             (0..3).map(move |c| (3 * pair + c, self.frame[c] * self.sign, self.at[is][0]))
         })
     }
 
-    /// The separation force and the places on which it acts, a quarter each.
+    /// Separation force, and the four places on which a quarter of it acts.
     pub fn load(&self) -> (Vec3, [Vec3; 4]) {
         (
             self.force_n,
@@ -121,19 +122,19 @@ impl Section {
     }
 }
 
-/// One side's bar along the seam, from a station to the next, or halfway there with an end of its own.
+/// Bar of one side along the seam, from a station to the next, or halfway there with an end of its own.
 #[derive(Debug)]
 pub(super) struct Bar {
-    /// Number among the bars of all parts.
+    /// Index among the bars of all parts.
     pub index: usize,
     pub side: Side,
     pub from: usize,
     pub to: Result<usize, Section>,
-    /// Corners of its tetrahedra, as nodes of the bar's lattice.
+    /// Corners of the bar's tetrahedra, as nodes of its lattice.
     pub tets: Vec<[usize; 4]>,
 }
 
-/// The lattice node at `is` along s, `k` across and `it` along the seam.
+/// Lattice node at `is` along s, `k` across and `it` along the seam.
 fn lattice(is: usize, k: usize, it: usize) -> usize {
     (it * N_ALONG_S + is) * N_ACROSS + k
 }
@@ -151,13 +152,14 @@ fn cell_tets(cell: usize) -> [[usize; 4]; 6] {
     })
 }
 
-/// Where the corner `node` of the lattice is.
+/// Position of the corner `node` of the lattice.
 pub(super) fn corner(sections: [&Section; 2], node: usize) -> Vec3 {
     let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
     sections[it / 2].at[is / 2][k / 2]
 }
 
-/// How a node moves with the wall, if it does: a node halfway where both ends do.
+/// Weights that move a node with the wall, if it does. A node halfway moves with the wall if both its ends
+/// do.
 fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
     let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
     let end = |up: bool| {
@@ -184,8 +186,8 @@ fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
     )
 }
 
-/// Tetrahedra of the bar between two cross-sections that are not rigidly part of the wall, as nodes of its
-/// lattice; nothing where the sections are so far twisted that it would turn inside out.
+/// Tetrahedra of the bar between two cross-sections, as nodes of its lattice, without those that move rigidly
+/// with the wall. `None` if the sections are twisted so far that the bar would turn inside out.
 pub(super) fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
     let has_foot = sections[0].has_foot && sections[1].has_foot;
     let mut tets = Vec::new();
@@ -220,12 +222,12 @@ pub(super) fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
 }
 
 impl Bar {
-    /// Its stations: one or two.
+    /// Stations of the bar: one or two.
     pub fn stations(&self) -> impl Iterator<Item = usize> {
         std::iter::once(self.from).chain(self.to.as_ref().ok().copied())
     }
 
-    /// The cross-sections at its ends.
+    /// Cross-sections at the bar's ends.
     fn ends<'a>(&'a self, sections: &'a Sections) -> Option<[&'a Section; 2]> {
         let of = |station: usize| sections[station][self.side.index()].as_ref();
         let to = match &self.to {
@@ -235,8 +237,8 @@ impl Bar {
         Some([of(self.from)?, to])
     }
 
-    /// The cross-sections at its ends, and what moves each node: its own unknown or the wall's, by the first
-    /// of three.
+    /// Cross-sections at the bar's ends, and the unknowns that move each node, by the first of three: the
+    /// node's own, or those of the wall.
     pub fn movers<'a>(
         &'a self,
         sections: &'a Sections,
@@ -256,8 +258,8 @@ impl Bar {
         Some((ends, (0..N_BAR).map(mover).collect()))
     }
 
-    /// Stiffness, contact rows and load of the bar; `carries` says of which of its stations, so that each
-    /// counts once.
+    /// Stiffness, contact rows and load of the bar. `carries` selects the stations whose rows and load belong
+    /// to this bar, so that each counts once.
     pub fn front(
         &self,
         model: &VolumeModel,
@@ -284,7 +286,7 @@ impl Bar {
 
     fn used_nodes(&self) -> Vec<usize> {
         let mut nodes: Vec<usize> = self.tets.iter().flat_map(|t| with_middles(*t)).collect();
-        // Pairs and loads act on front corners, in elements or not.
+        // Pairs and loads act on front corners, even if no element uses them.
         nodes.extend(
             [0, 2]
                 .into_iter()
@@ -323,7 +325,7 @@ impl Bar {
     }
 }
 
-/// The ten nodes of a tetrahedron of the lattice.
+/// Ten nodes of a tetrahedron of the lattice.
 pub(super) fn with_middles(corners: [usize; 4]) -> [usize; 10] {
     let mut nodes = [0; 10];
     nodes[..4].copy_from_slice(&corners);
@@ -333,8 +335,8 @@ pub(super) fn with_middles(corners: [usize; 4]) -> [usize; 10] {
     nodes
 }
 
-/// The nearest of `tets` to `x` (largest least barycentric coordinate): its corners with their weights at
-/// `x`.
+/// Interpolates at `x` in the nearest of `tets`, which has the largest least barycentric coordinate: its
+/// corners with their weights.
 pub(super) fn interpolation(tets: impl Iterator<Item = ([u32; 4], [Vec3; 4])>, x: Vec3) -> [(u32, f64); 4] {
     let mut best = ([(0, 0.0); 4], f64::NEG_INFINITY);
     for (nodes, corners) in tets {
@@ -348,7 +350,7 @@ pub(super) fn interpolation(tets: impl Iterator<Item = ([u32; 4], [Vec3; 4])>, x
     best.0
 }
 
-/// Adds up a bar's front.
+/// Accumulates the front of a bar.
 struct Accumulator {
     front: Front,
     used: Vec<usize>,
@@ -381,7 +383,7 @@ impl Accumulator {
         self.front.ids.partition_point(|&other| other < id)
     }
 
-    /// Pᵀ K P, where P takes the unknowns to the nodes.
+    /// Adds Pᵀ K P, where P maps the unknowns to the nodes.
     fn add_stiffness(&mut self, k_bar: &[f64], movers: &[Hold]) {
         const N: usize = 3 * N_BAR;
         let n = self.front.ids.len();
@@ -415,8 +417,8 @@ impl Accumulator {
         }
     }
 
-    /// Adds `value`, a vector, between unknown `id` and the node's motion; `id` comes after the wall, and
-    /// before the nodes.
+    /// Adds the vector `value` between unknown `id` and a node's motion. `id` comes after the wall's unknowns
+    /// and before the nodes'.
     fn couple(&mut self, id: u32, movers: &Hold, value: Vec3) {
         let (n, at) = (self.front.ids.len(), self.place(id));
         for (first, weight) in movers {
@@ -444,10 +446,10 @@ impl Accumulator {
     }
 }
 
-/// Adds up the fronts of a part's `bars` and eliminates their own unknowns; one front is left for each chain
-/// of bars that follow each other.
+/// Adds up the fronts of a part's `bars` and eliminates their own unknowns. One front is left for each chain
+/// of consecutive bars.
 ///
-/// Halves are condensed first, then joined: what remains of each is short, however long the seam.
+/// Halves are condensed first, then joined: the remainder of each is short, however long the seam.
 pub(super) fn condensed(
     fronts: &[Front],
     bars: &[&Bar],

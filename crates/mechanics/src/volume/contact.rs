@@ -1,8 +1,8 @@
-//! Static equilibrium of elastic parts that touch: who presses on whom, and how far all move.
+//! Static equilibrium of elastic parts in contact: contact forces and motions.
 //!
-//! Unknowns are the forces λ at the contact rows and the rigid motions α of the free parts; F is the sum of
-//! the parts' compliances, B their rigid motions seen at the rows, d the displacement by the load alone, g
-//! the load's work on rigid motions:
+//! The unknowns are the forces λ at the contact rows and the rigid motions α of the free parts. F is the sum
+//! of the parts' compliances, B their rigid motions along the rows, d the displacement by the load alone, and
+//! g the load's work on rigid motions:
 //! ```text
 //!     δ = F λ + B α + d      gap at the rows, male minus female; at walls, b minus a
 //!     0 = Bᵀ λ + g           equilibrium of every free part
@@ -13,18 +13,19 @@ use shellock_geom::sparse::{SparseError, eliminate_leading};
 
 use super::rows::Law;
 
-/// Compliance that every contact has of its own, as a share of the mean: keeps the system definite where two
-/// rows say the same.
+/// Compliance of every contact itself, as a share of the mean. It keeps the system definite where two rows
+/// are redundant.
 const CONTACT_COMPLIANCE: f64 = 1e-10;
-/// Stiffness of springs between free parts and the ground, as a share of what contact does: far below the
-/// accuracy of any opening, and enough to give each step of the active set one solution.
+/// Stiffness of springs between free parts and the ground, as a share of the contacts' stiffness. It is far
+/// below the accuracy of any opening, yet gives each step of the active set a unique solution.
 const GROUND_STIFFNESS: f64 = 1e-10;
-/// Rounds of the active set without improvement before it changes one row at a time, which always ends.
+/// Rounds without improvement of the active set, after which it changes one row at a time, which always
+/// terminates.
 const MAX_STALLED: usize = 4;
-/// Rounds after which a contact problem is called stuck; those measured end within 12.
+/// Rounds after which a contact problem counts as not converged; the measured ones end within 12.
 const MAX_ROUNDS: usize = 400;
 
-/// What contact sees of one part.
+/// Response of one part, as the contacts see it.
 #[derive(Debug, Default)]
 pub(super) struct Response {
     /// Contact rows of the assembly that touch the part, ascending.
@@ -33,20 +34,20 @@ pub(super) struct Response {
     pub compliance: Vec<f64>,
     /// Displacement along each row by the load alone, mm.
     pub drift_mm: Vec<f64>,
-    /// Displacement along each row by the part's rigid motions; zero where it is held.
+    /// Displacement along each row by the part's rigid motions; zero where the part is held.
     pub rigid: Vec<[f64; 6]>,
     /// Work of the load on each rigid motion, N.
     pub rigid_load_n: [f64; 6],
-    /// First of six unknown motions among those of all free parts.
+    /// Index of the first of its six unknown motions among those of all free parts.
     pub first_motion: Option<usize>,
 }
 
-/// Forces and motions in equilibrium.
+/// Contact forces and rigid motions in equilibrium.
 #[derive(Debug)]
 pub(super) struct Equilibrium {
     /// Force along each row, N.
     pub force_n: Vec<f64>,
-    /// Rigid motions of the free parts.
+    /// Rigid motions of the free parts, six for each.
     pub motion: Vec<f64>,
 }
 
@@ -59,7 +60,7 @@ impl Response {
         place
     }
 
-    /// Displacement of the part along its rows.
+    /// Displacement of the part along its rows, mm.
     pub fn displacement_mm(&self, equilibrium: &Equilibrium) -> Vec<f64> {
         let n = self.rows.len();
         let mut moved = self.drift_mm.clone();
@@ -82,8 +83,8 @@ impl Response {
     }
 }
 
-/// A dense symmetric system `K x = b`, b its last column, and the solution of the rows eliminated from that
-/// of the others.
+/// Dense symmetric system `K x = b`, with b as its last column, after elimination of its leading rows. Gives
+/// their solution from that of the other rows.
 struct Eliminated {
     values: Vec<f64>,
     n: usize,
@@ -101,7 +102,7 @@ impl Eliminated {
         self.values[i + self.n * j]
     }
 
-    /// The unknowns eliminated, where the others but b are `rest`.
+    /// Solution of the eliminated unknowns, where the others are `rest`.
     fn eliminated(&self, rest: &[f64]) -> Vec<f64> {
         let (n, k) = (self.n, self.k);
         let mut x: Vec<f64> = (0..k)
@@ -119,7 +120,7 @@ impl Eliminated {
     }
 }
 
-/// Solves for contact to the relative `tolerance`; nothing if the active set does not settle.
+/// Solves the contact problem to the relative `tolerance`; `None` if the active set does not settle.
 pub(super) fn solve(
     parts: &[Response],
     laws: &[Law],
@@ -148,7 +149,7 @@ pub(super) fn solve(
     Ok(Some(Equilibrium { force_n, motion }))
 }
 
-/// `[F B −d; Bᵀ 0 −g; · · 0]` over the rows in `order`, lower triangle.
+/// System matrix `[F B −d; Bᵀ 0 −g; · · 0]` over the rows in `order`, lower triangle.
 fn system(parts: &[Response], order: &[usize], n_rows: usize, n_motions: usize) -> Vec<f64> {
     let n = order.len() + n_motions + 1;
     let mut values = vec![0.0; n * n];
@@ -186,9 +187,9 @@ fn system(parts: &[Response], order: &[usize], n_rows: usize, n_motions: usize) 
 /// Forces along rows, N, and rigid motions.
 type ForcesAndMotions = (Vec<f64>, Vec<f64>);
 
-/// Block principal pivoting: the forces along the unilateral rows, and the rigid motions.
+/// Block principal pivoting. Returns the forces along the unilateral rows, and the rigid motions.
 ///
-/// All rows that are wrong change sides at once, until that no longer helps; then the last wrong one alone.
+/// All wrong rows change sides at once, until that no longer helps; then only the last wrong one does.
 fn active_set(
     whole: &Eliminated,
     n_pushes: usize,
@@ -247,7 +248,7 @@ fn active_set(
     Ok(None)
 }
 
-/// Forces along the `active` rows where their gaps are zero, and the rigid motions.
+/// Forces along the `active` rows, whose gaps are zero, and the rigid motions.
 fn with_active(
     whole: &Eliminated,
     active: &[usize],
@@ -272,10 +273,10 @@ fn with_active(
             .collect()
     };
     let forces = Eliminated::new(gather(&picked, whole), picked.len(), active.len())?;
-    // What is left for the motions is negative definite: contact resists them.
+    // The Schur complement for the motions is negative definite: contact resists them.
     let n = n_motions + 1;
     let mut coarse: Vec<f64> = gather(&(0..n).collect::<Vec<_>>(), &forces);
-    // Where nothing is active yet, a single contact is the measure.
+    // While no row is active, a single contact sets the scale.
     let compliance: f64 = (0..n_pushes).map(|i| whole.at(i, i)).sum();
     let contact_n_mm = if compliance > 0.0 {
         n_pushes as f64 / compliance

@@ -4,7 +4,7 @@ use shellock_geom::Vec3;
 
 use crate::Material;
 
-/// The two corners that each node beyond the fourth lies between.
+/// End corners of the edge on which each node beyond the fourth lies.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
 /// Degree of the displacement inside a tetrahedron.
@@ -17,7 +17,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// Nodes of a tetrahedron.
+    /// Number of nodes of a tetrahedron.
     pub(super) fn n_nodes(self) -> usize {
         match self {
             Self::Linear => 4,
@@ -32,7 +32,7 @@ pub(super) fn lame(material: &Material) -> (f64, f64) {
     (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)))
 }
 
-/// Six times the volume, positive where `d` sees `abc` clockwise.
+/// Six times the signed volume, positive where `d` sees `abc` clockwise.
 pub(super) fn volume_6(c: [Vec3; 4]) -> f64 {
     (c[1] - c[0]).cross(c[2] - c[0]).dot(c[3] - c[0])
 }
@@ -45,7 +45,8 @@ pub(super) fn gradients(c: [Vec3; 4]) -> [Vec3; 4] {
     [-(ga + gb + gd), ga, gb, gd]
 }
 
-/// Gradients of the shape functions at barycentric coordinates `l`; the first `order.n_nodes()` are of use.
+/// Gradients of the shape functions at barycentric coordinates `l`; only the first `order.n_nodes()` are
+/// valid.
 fn shape_gradients(order: Order, g: &[Vec3; 4], l: [f64; 4]) -> [Vec3; 10] {
     let mut shape = [Vec3::ZERO; 10];
     for i in 0..4 {
@@ -60,7 +61,7 @@ fn shape_gradients(order: Order, g: &[Vec3; 4], l: [f64; 4]) -> [Vec3; 10] {
     shape
 }
 
-/// Calls `add(a, b, k)` with the 3 × 3 stiffness `k[row][column]` between nodes a and b, N/mm, for all a ≤ b.
+/// Calls `add(a, b, k)` for all nodes a ≤ b with their 3 × 3 stiffness `k[row][column]`, N/mm.
 ///
 /// Four points integrate the products of linear strains exactly.
 pub(super) fn stiffness(
@@ -97,8 +98,8 @@ pub(super) fn stiffness(
     }
 }
 
-/// Von Mises stress at barycentric coordinates `l`, MPa; the first `order.n_nodes()` of `displacement_mm` are
-/// of use.
+/// Von Mises stress at barycentric coordinates `l`, MPa. Only the first `order.n_nodes()` of
+/// `displacement_mm` are used.
 pub(super) fn von_mises_mpa(
     order: Order,
     corners: [Vec3; 4],

@@ -1,8 +1,8 @@
-//! Dense pieces of a large symmetric matrix, added up and eliminated one after the other.
+//! Dense blocks of a large symmetric matrix, assembled and eliminated one after the other.
 
 use shellock_geom::sparse::{SparseError, eliminate_leading};
 
-/// A symmetric matrix between labelled unknowns: lower triangle by columns.
+/// Symmetric matrix between labelled unknowns: lower triangle, column-major.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
     pub ids: Vec<u32>,
@@ -10,8 +10,8 @@ pub(super) struct Front {
 }
 
 impl Front {
-    /// The sum of `fronts` with all unknowns eliminated that `is_eliminated` names; the others stay, in
-    /// ascending order.
+    /// Sums `fronts` and eliminates the unknowns chosen by `is_eliminated`; the others remain, in ascending
+    /// order.
     pub fn condensed(fronts: &[&Self], is_eliminated: impl Fn(u32) -> bool) -> Result<Self, SparseError> {
         let mut ids: Vec<u32> = fronts.iter().flat_map(|f| &f.ids).copied().collect();
         let key = |id: u32| (!is_eliminated(id), id);
@@ -30,7 +30,7 @@ impl Front {
             for (j, &column) in place.iter().enumerate() {
                 let source = &front.values[place.len() * j + j..place.len() * (j + 1)];
                 if is_sorted && place[place.len() - 1] - column == source.len() - 1 {
-                    // One run of unknowns, as the wall's are.
+                    // Consecutive unknowns, as the wall's are, are added in one run.
                     values[n * column + column..][..source.len()]
                         .iter_mut()
                         .zip(source)
@@ -54,7 +54,7 @@ impl Front {
         })
     }
 
-    /// Unknown `id` coupled to `others`, which are ascending and all before it.
+    /// Couples unknown `id` to `others`, which are ascending and all before it.
     pub fn coupling(id: u32, others: &[(u32, f64)]) -> Self {
         let n = others.len() + 1;
         let mut values = vec![0.0; n * n];
@@ -67,7 +67,7 @@ impl Front {
         }
     }
 
-    /// The front with some unknowns held at zero.
+    /// Front with some unknowns held at zero.
     pub fn without(&self, is_held: impl Fn(u32) -> bool) -> Self {
         let n = self.ids.len();
         let kept: Vec<usize> = (0..n).filter(|i| !is_held(self.ids[*i])).collect();

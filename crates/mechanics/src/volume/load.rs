@@ -1,12 +1,13 @@
-//! Forces from outside: how far the seams open, and how much walls and connectors are stressed.
+//! External loads: openings of the seams, and stresses in walls and connectors.
 //!
-//! Each part with its connectors is one sparse system `K u = f + Jᵀ λ`, J its contact rows. A part that is
-//! free to move is held at six unknowns that suffice and bear nothing, since all forces on it balance in the
-//! end. Solved for each row and for the load, it gives the compliance and the drift that contact (`contact`)
+//! Each part with its connectors is one sparse system `K u = f + Jᵀ λ`, where J are its contact rows. A free
+//! part is held at six unknowns; these supports suffice and carry no force, since all forces on the part
+//! balance in the end. Solving for each row and for the load gives the compliance and drift that `contact`
+//! needs. With the contact forces, it gives the stresses.
 //! asks for; with the contact's forces, the stresses.
 //!
-//! What is clamped bears the load. Where nothing is clamped, as in a fall, the forces accelerate the whole as
-//! a rigid body, and the inertia of the walls balances them (inertia relief). Connectors have no mass.
+//! Clamped points carry the load. If nothing is clamped, as in a fall, the forces accelerate the whole as a
+//! rigid body, and the inertia of the walls balances them (inertia relief). Connectors have no mass.
 
 use std::collections::BTreeMap;
 
@@ -27,35 +28,35 @@ use super::{VolumeError, VolumeModel, mechanism};
 use crate::Meeting;
 use crate::assembly::is_lost;
 
-/// g/cm³ in t/mm³, so that t · mm/s² = N.
+/// Conversion from g/cm³ to t/mm³, so that t · mm/s² = N.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
 
-/// What forces from outside do to an assembly.
+/// Response of an assembly to external loads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// How far each station opens, mm: the larger distance between male and female at the root and at the tip
-    /// of the pin; where there is no joint, how far the walls' faces part.
+    /// Opening of each station, mm: the larger distance between male and female at the root and at the tip of
+    /// the pin. Where there is no joint, the distance between the walls' faces.
     pub opening_mm: Vec<f64>,
-    /// The joints (ascending) whose pins have left their channels.
+    /// Joints (ascending) whose pins have left their channels.
     pub lost: Vec<u32>,
-    /// Stress in the walls.
+    /// Stress in the walls of all parts.
     pub walls: StressLevel,
     /// Stress in pins and channels.
     pub connectors: StressLevel,
-    /// The largest stress in the wall below each triangle, MPa.
+    /// Largest stress in the wall below each triangle, MPa.
     pub triangle_mpa: Vec<f64>,
-    /// Forces and torques on each part's six rigid motions that nothing balances, N, relative to the largest
-    /// force: rounding.
+    /// Unbalanced forces and torques on the parts' six rigid motions, N, relative to the largest force:
+    /// rounding errors.
     pub imbalance: f64,
 }
 
 impl VolumeModel {
-    /// Mass of all walls, t.
+    /// Total mass of all walls, t.
     pub fn mass_t(&self) -> f64 {
         self.node_masses_t().iter().sum()
     }
 
-    /// A quarter of each tetrahedron's mass at each of its corners.
+    /// Node masses: a quarter of each tetrahedron's mass at each of its corners.
     fn node_masses_t(&self) -> Vec<f64> {
         let mut mass_t = vec![0.0; self.wall.nodes.len()];
         let density_t_mm3 = self.params.material.density_g_cm3 * T_MM3_PER_G_CM3;
@@ -66,11 +67,11 @@ impl VolumeModel {
         mass_t
     }
 
-    /// What `forces_n`, one at each point of the outer surface, do to the parts joined by `plan`; or the
-    /// parts that come off.
+    /// Solves for the response of the parts joined by `plan` to `forces_n`, one at each point of the outer
+    /// surface; or for the parts that come off.
     ///
-    /// What is clamped bears them; where nothing is, the walls' inertia does. The separation force does not
-    /// act.
+    /// Clamped points carry the forces; if there are none, the walls' inertia does. The separation force does
+    /// not act.
     pub fn under_load(
         &self,
         plan: &[Meeting],
@@ -80,7 +81,7 @@ impl VolumeModel {
         Ok(all.remove(0))
     }
 
-    /// What each of `loads_n` does on its own, as [`under_load`](Self::under_load) says; in less time.
+    /// Solves for each of `loads_n` separately, like [`under_load`](Self::under_load), but faster.
     pub fn under_loads(
         &self,
         plan: &[Meeting],
@@ -125,7 +126,7 @@ impl VolumeModel {
             .par_iter_mut()
             .map(|body| body.load(self, plan, sections, &balanced_n))
             .collect();
-        // Where all parts float, the first is where the others are seen from; its forces balance with the
+        // If all parts float, the first one is the reference frame of the others; its forces balance with the
         // whole's.
         let n_motions = number_motions(&mut responses, |i| {
             self.parts[i].rigid.is_some() && (i > 0 || self.is_held())
@@ -164,7 +165,7 @@ impl VolumeModel {
         self.is_clamped.iter().any(|is| *is)
     }
 
-    /// Forces at the wall nodes, the inertia of a whole that nothing holds among them.
+    /// Forces at the wall nodes, plus inertia forces if nothing holds the assembly.
     pub(super) fn balanced(&self, forces_n: &[Vec3]) -> Result<Vec<Vec3>, SparseError> {
         let nodes = &self.wall.nodes;
         let mut loads_n = forces_n.to_vec();
@@ -220,7 +221,7 @@ impl VolumeModel {
         plan.iter().zip(moved).zip(gap_mm).map(opening).collect()
     }
 
-    /// The largest stress below each triangle, and that of all walls.
+    /// Largest stress below each triangle, and the stress level of all walls.
     fn wall_stress(&self, bodies: &[Body]) -> (Vec<f64>, StressLevel) {
         let samples: Vec<(u32, [Sample; 4])> = bodies
             .par_iter()
@@ -238,7 +239,7 @@ impl VolumeModel {
     }
 }
 
-/// Numbers the motions of the parts that may move: how many there are.
+/// Numbers the motions of the free parts and returns their count.
 fn number_motions(responses: &mut [Response], is_free: impl Fn(usize) -> bool) -> usize {
     let mut n_motions = 0;
     for (_, response) in responses.iter_mut().enumerate().filter(|(i, _)| is_free(*i)) {
@@ -248,8 +249,7 @@ fn number_motions(responses: &mut [Response], is_free: impl Fn(usize) -> bool) -
     n_motions
 }
 
-/// What contact and load leave of force on the rigid motions of the free parts, relative to the largest
-/// force.
+/// Unbalanced contact and load forces on the rigid motions of the free parts, relative to the largest force.
 fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3]) -> f64 {
     let largest_n = forces_n
         .iter()
@@ -272,32 +272,33 @@ fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3
 /// One part with its connectors.
 pub(super) struct Body<'a> {
     part: u32,
-    /// Tetrahedra of its wall.
+    /// Tetrahedra of the part's wall.
     tets: Vec<u32>,
     numbering: Numbering,
     bars: Vec<&'a Bar>,
     labels: Labels,
     /// Labels of the bars' own unknowns, ascending; they come after the wall's.
     own: Vec<u32>,
-    /// Wall nodes that labels count.
+    /// Wall nodes that the labels number.
     kept: &'a [u32],
     stiffness: Cholesky,
     is_pinned: Vec<bool>,
-    /// For each contact row, the unknowns that it acts on.
+    /// Unknowns that each contact row acts on, with their weights.
     rows: BTreeMap<u32, Vec<(u32, f64)>>,
-    /// What contact sees: minus the displacement along each row by each row's force and, last, by the load.
+    /// Front as the contacts see it: minus the displacement along each row by each row's force and, last, by
+    /// the load.
     front: Front,
     /// Force on each unknown, N.
     load_n: Vec<f64>,
-    /// Displacement of each unknown, but for a rigid motion where the part is free, mm.
+    /// Displacement of each unknown, mm; for a free part, up to a rigid motion.
     moved_mm: Vec<f64>,
 }
 
-/// A stiffness matrix in parts: row, column, N/mm.
+/// Entries of a stiffness matrix: row, column, N/mm.
 type Entries = Vec<(u32, u32, f64)>;
 
 impl<'a> Body<'a> {
-    /// The part, under no load.
+    /// Builds the part without load.
     pub fn new(
         model: &'a VolumeModel,
         part: u32,
@@ -359,7 +360,7 @@ impl<'a> Body<'a> {
         Ok(body)
     }
 
-    /// Puts the forces at the wall nodes on it: what contact sees of it.
+    /// Applies the forces at the wall nodes, and returns the response that the contacts see.
     pub fn load(
         &mut self,
         model: &VolumeModel,
@@ -392,7 +393,7 @@ impl<'a> Body<'a> {
         response
     }
 
-    /// The unknown that a label means; none for contact rows and the load.
+    /// Unknown of a label; `None` for contact rows and the load.
     fn unknown(&self, id: u32) -> Option<u32> {
         if self.labels.is_wall(id) {
             let at = self
@@ -408,7 +409,7 @@ impl<'a> Body<'a> {
             .map(|at| (self.numbering.n + at) as u32)
     }
 
-    /// Adds stiffness to `entries`, and takes note of the rows.
+    /// Adds stiffness to `entries`, and records the contact rows.
     fn add_fronts(&mut self, fronts: &[Front], entries: &mut Entries) {
         for front in fronts {
             let n = front.ids.len();
@@ -425,7 +426,7 @@ impl<'a> Body<'a> {
                         (Some(of), None) => (front.ids[j], of),
                         (None, None) => continue,
                     };
-                    // Most of a row's places are empty, and the separation force does not act.
+                    // Most entries of a row are zero, and the separation force does not act.
                     if value != 0.0 && row != self.labels.load() {
                         self.rows.entry(row).or_default().push((of, value));
                     }
@@ -434,8 +435,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Holds six unknowns of the wall that leave it no rigid motion: one after the other the one that moves
-    /// farthest.
+    /// Holds six unknowns of the wall that leave it no rigid motion: each time the one that moves farthest.
     fn pin(&mut self, model: &VolumeModel) {
         let points: Vec<Vec3> = self
             .numbering
@@ -494,7 +494,7 @@ impl<'a> Body<'a> {
             .for_each(|(f, _)| *f = 0.0);
     }
 
-    /// Displaces it by the load and by what contact presses.
+    /// Displaces the part by the load and the contact forces.
     fn move_by(&mut self, equilibrium: &Equilibrium) {
         let mut side = self.load_n.clone();
         for (id, row) in &self.rows {

@@ -1,4 +1,4 @@
-//! Rigid motions that no contact stops: which parts come off.
+//! Rigid motions that no contact stops, and the parts that come off.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -6,20 +6,20 @@ use super::contact::Response;
 use super::rows::Law;
 
 /// Mean displacement along blocked directions, as a share of the motion, below which the motion is free.
-/// Frames are exact to rounding; a motion that is this nearly free would open seams ten thousand times
+/// Frames are exact to rounding. A motion that is this nearly free would open seams ten thousand times
 /// further than the parts deform.
 const FREE: f64 = 1e-4;
-/// Depth, as a share of the probe, that is none whatever the motion.
+/// Depth, as a share of the probe, that counts as zero for any motion.
 const ROUNDING: f64 = 1e-9;
 /// Rounds of a projection onto the cone of free motions, for each of its dimensions.
 const MAX_ROUNDS: usize = 50;
 
-/// The parts (ascending, by place in `parts`) that some rigid motion takes off: along n nothing moves, along
-/// ŝ nothing moves into the floor, and no wall into another.
+/// Parts (ascending, by index in `parts`) that some rigid motion takes off. Such a motion has no displacement
+/// along n, none into the floor along ŝ, and none of a wall into another.
 ///
-/// The motions that keep all gaps along n are a linear space, found from its Gram matrix. In it, the pushes
-/// leave a cone, which holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in it
-/// that is not rest.
+/// The motions that keep all gaps along n form a linear space, found from its Gram matrix. In it, the pushes
+/// leave a cone. The cone holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in
+/// it that is not rest.
 pub(super) fn loose_parts(parts: &[Response], laws: &[Law], n_motions: usize) -> Vec<u32> {
     if n_motions == 0 {
         return Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn loose_parts(parts: &[Response], laws: &[Law], n_motions: usize) ->
         .collect()
 }
 
-/// What each row sees of the motions: first unknown and six coefficients, of both sides.
+/// Motions that act on a row, from both sides: first unknown and six coefficients.
 type Seen = Vec<(usize, [f64; 6])>;
 
 fn seen_motions(parts: &[Response], n_rows: usize) -> Vec<Seen> {
@@ -77,7 +77,7 @@ fn dense(seen: &Seen, n_motions: usize) -> DVector<f64> {
     row
 }
 
-/// An orthonormal basis, by columns, of the motions that rows of both signs do not see.
+/// Orthonormal basis, by columns, of the motions that leave all two-sided rows unchanged.
 fn free_space(seen: &[Seen], laws: &[Law], n_motions: usize) -> DMatrix<f64> {
     let mut gram = DMatrix::zeros(n_motions, n_motions);
     for seen in seen
@@ -110,7 +110,7 @@ fn free_space(seen: &[Seen], laws: &[Law], n_motions: usize) -> DMatrix<f64> {
     }
 }
 
-/// The point nearest to `probe` with no negative product with any of `pushes` (Lawson and Hanson on the dual
+/// Point nearest to `probe` with no negative product with any of `pushes` (Lawson and Hanson on the dual
 /// problem).
 fn nearest_in_cone(pushes: &[DVector<f64>], probe: DVector<f64>) -> DVector<f64> {
     let mut held: Vec<usize> = Vec::new();
@@ -128,7 +128,7 @@ fn nearest_in_cone(pushes: &[DVector<f64>], probe: DVector<f64>) -> DVector<f64>
         weight.push(0.0);
         while !held.is_empty() {
             let columns = DMatrix::from_columns(&held.iter().map(|i| pushes[*i].clone()).collect::<Vec<_>>());
-            // Least squares by singular values: pushes may depend on each other.
+            // Least squares by singular values, since pushes may depend on each other.
             let Ok(best) = columns.clone().svd(true, true).solve(&-&probe, 1e-12) else {
                 return nearest;
             };

@@ -1,4 +1,4 @@
-//! The wall of one part, condensed onto the points near its seams: what no plan changes.
+//! Wall of one part, condensed onto the points near its seams, which is the same for all plans.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::{SparseError, SparseSymmetric};
@@ -8,15 +8,15 @@ use super::front::Front;
 use super::wall::Wall;
 use crate::Material;
 
-/// A part's elastic wall as seen by its connectors.
+/// Elastic wall of a part as seen by its connectors.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Wall nodes near the seams, ascending; the unknowns of node `kept[i]` are `3 i .. 3 i + 3`.
     pub kept: Vec<u32>,
-    /// Stiffness between their unknowns, N/mm. Where the part is free to move, its rigid motions are held by
-    /// springs that act on nothing else, so that loads in equilibrium deform it as if they were not there.
+    /// Stiffness between the unknowns of the kept nodes, N/mm. If the part is free, springs hold its rigid
+    /// motions and act on nothing else, so loads in equilibrium deform it as if they were absent.
     pub stiffness: Front,
-    /// Its rigid motions, unless it is clamped.
+    /// Rigid motions of the part, unless it is clamped.
     pub rigid: Option<RigidModes>,
 }
 
@@ -52,11 +52,11 @@ impl RigidModes {
     }
 }
 
-/// Unknowns of a part: interior nodes first, then the kept ones; none for clamped nodes.
+/// Numbering of a part's unknowns: interior nodes first, then the kept ones; none for clamped nodes.
 pub(super) struct Numbering {
     pub vertices: Vec<u32>,
     edges: Vec<[u32; 2]>,
-    /// First of three unknowns of each vertex, then of each edge's middle.
+    /// First of three unknowns of each vertex, then of each edge's midpoint.
     pub first: Vec<Option<u32>>,
     pub n: usize,
 }

@@ -1,4 +1,4 @@
-//! Contact rows of a station: who may not move where against whom.
+//! Contact rows of a station: the relative motions that each of them restricts.
 //!
 //! | row  | where            | along | law                                     |
 //! | :--- | :--------------- | :---- | :-------------------------------------- |
@@ -14,24 +14,24 @@ use super::front::Front;
 use super::unknowns::Labels;
 use crate::{Meeting, Side};
 
-/// Contact rows of a station.
+/// Number of contact rows of a station.
 pub(super) const ROWS: usize = 7;
 
-/// The row of the walls' faces; those before belong to the connector.
+/// Index of the row for the walls' faces; those before belong to the connector.
 pub(super) const WALL: usize = 6;
 
-/// How a row takes part.
+/// Constraint that a row imposes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Law {
-    /// δ = 0.
+    /// Gap closed in both directions: δ = 0.
     Both,
-    /// δ ≥ 0.
+    /// Gap may open but not close: δ ≥ 0.
     Push,
-    /// No force.
+    /// Row without any force.
     Free,
 }
 
-/// The law of each contact row; of use where the row has a side at all.
+/// Law of each contact row; it is used only if the row has a side.
 pub(super) fn laws(plan: &[Meeting]) -> Vec<Law> {
     let of_station = |meeting: &Meeting| {
         let [along_n, along_s, along_u] = match meeting.joint {
@@ -44,7 +44,7 @@ pub(super) fn laws(plan: &[Meeting]) -> Vec<Law> {
     plan.iter().flat_map(of_station).collect()
 }
 
-/// Direction in which contact of the walls' faces acts on `side`: they part when b goes along `wall`, or a
+/// Direction in which contact of the walls' faces acts on `side`. They part when b moves along `wall`, or a
 /// against it.
 pub(super) fn off_the_wall(meeting: &Meeting, side: Side) -> Vec3 {
     if side == Side::A {
@@ -55,20 +55,20 @@ pub(super) fn off_the_wall(meeting: &Meeting, side: Side) -> Vec3 {
 }
 
 impl VolumeModel {
-    /// Where `side` of a station is at mid-wall.
+    /// Position of `side` of a station at mid-wall.
     pub(super) fn mid_wall(&self, station: usize, side: Side) -> Vec3 {
         let [outer, inner] = self.faces(station, side).map(|node| self.wall.nodes[node]);
         outer.midpoint(inner)
     }
 
-    /// The wall nodes of a station's point on the outer and on the inner surface.
+    /// Wall nodes of a station's point on the outer and on the inner surface.
     fn faces(&self, station: usize, side: Side) -> [usize; 2] {
         let point = self.stations[station].points[side.index()] as usize;
         [point, point + self.params.n_layers * self.wall.depth_mm.len()]
     }
 
-    /// One small front for each station of `part`: its wall's motion at mid-wall, the mean of outer and inner
-    /// surface, coupled to the row.
+    /// One small front for each station of `part`, which couples the wall's motion at mid-wall to the row.
+    /// That motion is the mean of outer and inner surface.
     pub(super) fn wall_fronts(&self, part: u32, plan: &[Meeting], labels: Labels) -> Vec<Front> {
         let sides = self.sides_of_part(part);
         let front = |(station, side): (usize, Side)| {
@@ -84,7 +84,7 @@ impl VolumeModel {
         sides.filter_map(front).collect()
     }
 
-    /// The stations that `part` takes part in, and on which side.
+    /// Stations that `part` belongs to, each with its side.
     pub(super) fn sides_of_part(&self, part: u32) -> impl Iterator<Item = (usize, Side)> {
         let of_station = move |(station, parts): (usize, &[u32; 2])| {
             let parts = *parts;

@@ -1,42 +1,42 @@
-//! Stresses in walls and connectors, and what of them to believe.
+//! Stresses in walls and connectors, and a robust measure of them.
 //!
-//! Von Mises stress is sampled at the corners of the tetrahedra, where bending has its largest, each with a
-//! quarter of the volume. At re-entrant corners and under point forces elasticity has no largest stress: the
-//! finer the mesh, the higher. So the figure to hold against a material's strength is the one that all but
-//! [`PEAK_SHARE`] of the volume stay under.
+//! Von Mises stress is sampled at the corners of the tetrahedra, where bending stress is largest, each with a
+//! quarter of the volume. At re-entrant corners and under point forces, elasticity has no largest stress: the
+//! finer the mesh, the higher the value. So the figure to compare with a material's strength is the one that
+//! all but [`PEAK_SHARE`] of the volume stay under.
 
 use shellock_geom::Vec3;
 
 use super::element::{Order, lame, volume_6, von_mises_mpa};
 use crate::Material;
 
-/// Share of the volume whose stress is taken for a peak that the model makes, and that a ductile print evens
+/// Share of the volume whose stress counts as a peak: an artefact of the model, which a ductile print evens
 /// out.
 pub const PEAK_SHARE: f64 = 0.005;
 
-/// How much some of the material is stressed, MPa (von Mises).
+/// Stress level of some of the material, MPa (von Mises).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StressLevel {
-    /// The largest sample.
+    /// Largest stress of all samples.
     pub largest_mpa: f64,
-    /// What all but 0.5 % of the volume stay under.
+    /// Stress that all but 0.5 % of the volume stay under.
     pub robust_mpa: f64,
-    /// Where the smallest sample is that is not below `robust_mpa`.
+    /// Position of the smallest sample that is not below `robust_mpa`.
     pub at: Vec3,
 }
 
-/// Stress at one place, with the volume that it stands for.
+/// Stress at one point, with the volume that the point represents.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// Von Mises, MPa.
+    /// Von Mises stress, MPa, ≥ 0.
     pub stress_mpa: f64,
-    /// mm³.
+    /// Volume that the sample represents, mm³.
     pub volume_mm3: f64,
-    /// mm.
+    /// Position of the sample, mm.
     pub at: Vec3,
 }
 
-/// At the four corners of a tetrahedron.
+/// Stress samples at the four corners of a tetrahedron.
 pub(super) fn samples(
     order: Order,
     corners: [Vec3; 4],
@@ -57,7 +57,7 @@ pub(super) fn samples(
 }
 
 impl StressLevel {
-    /// Of all samples; zero where there are none.
+    /// Stress level of all samples; zero if there are none.
     pub fn of(mut samples: Vec<Sample>) -> Self {
         samples.sort_by(|a, b| b.stress_mpa.total_cmp(&a.stress_mpa));
         let Some(largest) = samples.first() else {

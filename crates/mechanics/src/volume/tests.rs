@@ -5,7 +5,7 @@ use crate::sample;
 /// Connector size D: the middle of the paper's 2 to 4.
 const SIZE_MM: f64 = 3.0;
 
-/// Every station joined; friction holds part `fast`.
+/// Joins every station; friction holds part `fast`.
 fn joined(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meeting> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let joint = |s: &Station| {
@@ -43,7 +43,7 @@ fn plates_on_a_straight_seam_come_apart() {
 }
 
 /// Pins straight below a straight seam leave a plate two translations and a rotation. Walls across these hold
-/// it, each in its one direction, so that none of them may be missing or turned round.
+/// it, each in its one direction, so none of the walls may be missing or reversed.
 #[test]
 fn walls_block_what_pins_leave_free_each_in_one_direction() {
     let plates = sample::plates(30.0, 15.0, [6, 3]);
@@ -55,7 +55,7 @@ fn walls_block_what_pins_leave_free_each_in_one_direction() {
             .for_each(|(meeting, wall)| meeting.wall = wall);
         model.resist(&plan, 0).unwrap()
     };
-    // Both ends keep b from going down; in between, one station each keeps it from sliding to either side.
+    // Both ends keep b from going down; in between, one station each keeps b from sliding to either side.
     let walls = [Vec3::Z, Vec3::Y, -Vec3::Y, Vec3::X, Vec3::Z];
     assert!(matches!(with_walls(walls), Resistance::Holds(_)));
     for i in [0, 1, 2, 4] {
@@ -85,7 +85,7 @@ fn walls_alone_hold_no_octant() {
     );
 }
 
-/// Two clamped plates, the pins pulled straight out: a wall across their way is the only thing in it.
+/// Two clamped plates with the pins pulled straight out: a wall across their way is the only obstacle.
 #[test]
 fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
     let plates = sample::plates(20.0, 20.0, [8, 8]);
@@ -133,7 +133,7 @@ fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
     );
 }
 
-/// Contact is exact: whoever touches may not enter the other, by as little as a millionth of what opens.
+/// Contact is exact: parts that touch may not enter each other by as little as a millionth of the opening.
 #[test]
 fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move_at_all() {
     let ball = sample::ball(20.0, 4);
@@ -174,7 +174,7 @@ fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move
 }
 
 /// Root and tip lie along ŝ, so a connector that turns about n moves its tip along the seam by the depth of
-/// the pin more than its root: reading the root alone would miss it.
+/// the pin more than its root. Reading the root alone would miss that.
 #[test]
 fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
     let ball = sample::ball(20.0, 4);
@@ -198,8 +198,8 @@ fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
     assert!(n_by_root > 0 && n_by_tip > 0, "{n_by_root} {n_by_tip}");
 }
 
-/// The row of the walls' faces is read off the nodes, rigid motions off the place: both must mean the point
-/// at mid-wall.
+/// The row of the walls' faces is read off the nodes, rigid motions off the place: both must refer to the
+/// point at mid-wall.
 #[test]
 fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
     let ball = sample::ball(20.0, 4);
@@ -233,8 +233,8 @@ fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
     assert_eq!(n_seen, 9);
 }
 
-/// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its wall's stiffness on all
-/// points near the seam.
+/// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its stiffness is condensed
+/// onto all points near the seam.
 fn strip(order: Order, clamp: bool) -> (VolumeModel, ShellAssembly) {
     let plates = sample::plates(5.0, 40.0, [4, 20]);
     let is_far = |p: &shellock_geom::Vec3| p.x.abs() > 40.0 - 1e-9;
@@ -256,12 +256,12 @@ fn strip(order: Order, clamp: bool) -> (VolumeModel, ShellAssembly) {
     (VolumeModel::clamped(&params, &plates, &clamped).unwrap(), plates)
 }
 
-/// Deflection of a strip's tip, mm, under 1 N spread over its end face; and what beam theory says.
+/// Deflection of a strip's tip, mm, under 1 N spread over its end face; and the value by beam theory.
 fn tip_deflection(order: Order) -> (f64, f64) {
     let (model, _) = strip(order, true);
     let part = &model.parts[0];
     let n = part.stiffness.ids.len();
-    // The load is one more row: what is left of its diagonal is minus the work it does.
+    // The load is one more row; its remaining diagonal is minus the work of the load.
     let mut loaded = Front {
         ids: (0..=n as u32).collect(),
         values: vec![0.0; (n + 1) * (n + 1)],
@@ -291,7 +291,7 @@ fn a_cantilever_bends_as_a_beam_with_quadratic_elements_and_locks_with_linear_on
     assert!(linear < 0.8 * beam, "{linear} mm, beam {beam} mm");
 }
 
-/// Under uniform strain, internal forces vanish away from the surface and balance as a whole: tested with the
+/// Under uniform strain, internal forces vanish away from the surface and balance as a whole. Tested with the
 /// work, which is the strain energy density times the volume.
 #[test]
 fn uniform_strain_has_its_exact_energy() {
@@ -323,7 +323,7 @@ fn uniform_strain_has_its_exact_energy() {
     }
 }
 
-/// A bar that is pulled along one axis and free across it.
+/// Stress of a bar that is pulled along one axis and free across it.
 #[test]
 fn uniaxial_strain_with_lateral_contraction_has_the_stress_of_a_bar() {
     for (_, material) in Material::PRESETS {
@@ -338,8 +338,8 @@ fn uniaxial_strain_with_lateral_contraction_has_the_stress_of_a_bar() {
     }
 }
 
-/// In a channel whatever way it leans: n, ŝ and u are perpendicular to each other, and both sides see them
-/// the other way round.
+/// Channels of any tilt: n, ŝ and u are perpendicular to each other, and both sides see them with opposite
+/// signs.
 #[test]
 fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_share_of_the_force() {
     let ball = sample::ball(20.0, 4);
@@ -379,7 +379,7 @@ fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_sha
     }
 }
 
-/// Patch test: a free wall whose near nodes move uniformly bears on them with forces that balance, and rigid
+/// Patch test: a free wall whose near nodes move uniformly exerts forces on them that balance, and rigid
 /// motions cost nothing.
 #[test]
 fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
@@ -425,7 +425,8 @@ fn every_tetrahedron_of_a_ball_is_sound() {
     }
 }
 
-/// A ball thinner than its wall: at the depth asked for, prisms would turn over at the centre.
+/// A ball with a radius below its wall thickness: at the requested depth, prisms would turn over at the
+/// centre.
 #[test]
 fn where_no_wall_fits_it_is_thinner_and_sound() {
     let params = VolumeParams {
@@ -608,7 +609,7 @@ fn pins_that_slide_out_of_their_channels_do_not_hold() {
     ));
 }
 
-/// Points of `assembly` whose height lies beyond `z`, upwards or downwards.
+/// Points of `assembly` with a height beyond `z`, upwards or downwards.
 fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
     let is_beyond = |p: &Vec3| if z > 0.0 { p.z > z } else { p.z < z };
     (0..)
@@ -618,7 +619,7 @@ fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
         .collect()
 }
 
-/// A ball pressed on its top with `force_n`, its bottom held if `is_held`.
+/// Ball pressed on its top with `force_n`, with its bottom held if `is_held`.
 fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
     let ball = sample::ball(20.0, 4);
     let params = VolumeParams::default();
@@ -694,7 +695,7 @@ fn a_balls_mass_is_its_walls_volume_times_density() {
     assert!((mass_t / (wall_mm3 * 1.15e-9) - 1.0).abs() < 0.05, "{mass_t} t");
 }
 
-/// Away from where it is held and pulled.
+/// Stress is measured away from the held and the pulled end.
 #[test]
 fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
     let (model, plates) = strip(Order::Quadratic, true);
@@ -715,7 +716,7 @@ fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
         })
         .collect();
     let loaded = model.under_load(&plan, &forces_n).unwrap().unwrap();
-    // Pulled at the outer face of 2 mm: N/A + M/W = (1 + 3) F / (b h), of which von Mises sees all.
+    // Pulled at the outer face of 2 mm: N/A + M/W = (1 + 3) F / (b h), all of which is von Mises stress.
     let expected_mpa = 4.0 * 10.0 / (5.0 * 2.0);
     let middle = plates
         .triangles
@@ -734,7 +735,7 @@ fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
     );
 }
 
-/// Condensed onto the seams, and as one sparse system: two ways to the same compliance.
+/// Condensation onto the seams, and one sparse system: two ways to the same compliance.
 #[test]
 fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
     let plates = sample::plates(20.0, 10.0, [5, 3]);

@@ -1,10 +1,11 @@
-//! How the unknowns of a part are numbered.
+//! Numbering of the unknowns of a part.
 
 use super::connector::N_SECTION;
 use super::rows::ROWS;
 use crate::{SIDES, Side};
 
-/// Labels of a part's unknowns: wall, contact rows, load, nodes of the sections, nodes halfway.
+/// Labels of a part's unknowns, in this order: wall, contact rows, load, nodes of the sections, nodes
+/// halfway.
 #[derive(Clone, Copy)]
 pub(super) struct Labels {
     n_wall: u32,
@@ -24,11 +25,11 @@ impl Labels {
     pub fn row(self, station: usize, row: usize) -> u32 {
         self.n_wall + (station * ROWS + row) as u32
     }
-    /// Whether `id` is neither a contact row nor the load.
+    /// Returns true if `id` is neither a contact row nor the load.
     pub fn is_inner(self, id: u32) -> bool {
         self.is_wall(id) || id > self.load()
     }
-    /// The contact row that `id` means.
+    /// Contact row that label `id` stands for.
     pub fn row_of(self, id: u32) -> usize {
         (id - self.n_wall) as usize
     }
@@ -38,7 +39,7 @@ impl Labels {
     pub fn section(self, station: usize, side: Side) -> u32 {
         self.load() + 1 + ((2 * station + side.index()) * 3 * N_SECTION) as u32
     }
-    /// The bar's cross-section halfway, and the one at its free end.
+    /// First labels of the bar's cross-section halfway and of the one at its free end.
     pub fn within(self, bar: usize) -> [u32; 2] {
         let first = self.section(self.n_stations as usize, Side::A) + (2 * bar * 3 * N_SECTION) as u32;
         [first, first + 3 * N_SECTION as u32]
@@ -57,9 +58,9 @@ impl Labels {
     }
 }
 
-/// To what an unknown belongs.
+/// Owner of an unknown.
 pub(super) enum Owner {
-    /// The wall, contact or the load.
+    /// The wall, a contact row or the load.
     Part,
     /// A cross-section at a station.
     Section(usize, Side),

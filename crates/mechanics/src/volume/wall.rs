@@ -1,8 +1,8 @@
 //! The wall of all parts as tetrahedra: triangles of the outer surface, extruded inwards.
 //!
 //! A prism is cut into three tetrahedra along the diagonals that start at the lower-numbered point of each
-//! side, so that neighbours meet. Where a prism would fold over or become a sliver (tight concave places),
-//! the wall is made thinner there.
+//! side, so that neighbours match. Where a prism would fold over or become a sliver (tight concave places),
+//! the wall is made thinner.
 
 use shellock_geom::Vec3;
 
@@ -11,35 +11,36 @@ use crate::ShellAssembly;
 
 /// Least volume of a tetrahedron, as a share of that in a straight prism on the same triangle.
 ///
-/// With it, an inner triangle has at least about a tenth of the outer one's area. Elements that are worse
-/// make the stiffness matrix ill-conditioned, and stiff beyond what the little material is worth.
+/// With it, an inner triangle has at least about a tenth of the outer one's area. Worse elements make the
+/// stiffness matrix ill-conditioned, and too stiff for the little material that they represent.
 pub const MIN_VOLUME_SHARE: f64 = 0.1;
 
-/// Factor on the depth of a point whose prism is too bad.
+/// Factor on the depth of a point in a bad prism.
 const THINNER: f64 = 0.8;
 
-/// Least depth, as a share of the wall's. What is bad with it at all three corners has a bad triangle
-/// outside.
+/// Least depth, as a share of the wall's. A prism that is bad at this depth at all three corners has a bad
+/// outer triangle.
 const LEAST_DEPTH_SHARE: f64 = 0.03;
 
 /// Rounds of thinning: enough for the depths to fall from the wall's to the least, and then for the
 /// neighbours', which must not be many times deeper.
 const MAX_ROUNDS: usize = 64;
 
-/// Tetrahedra of all parts.
+/// Tetrahedra of the walls of all parts.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// Layer by layer from the outside; node `layer · n_points + point`.
+    /// Nodes layer by layer from the outside; node `layer · n_points + point`.
     pub nodes: Vec<Vec3>,
-    /// Four nodes of positive volume each; three times `n_layers` for each triangle, in its order.
+    /// Four nodes of each tetrahedron, with positive volume; three times `n_layers` for each triangle, in its
+    /// order.
     pub tets: Vec<[u32; 4]>,
     /// Depth of the wall at each point, mm.
     pub depth_mm: Vec<f64>,
-    /// How many points have a thinner wall than asked for.
+    /// Number of points with a thinner wall than requested.
     pub n_thinned: usize,
 }
 
-/// A triangle on which no prism stands, however thin.
+/// Triangle on which no prism fits, however thin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FlatTriangle(pub u32);
 
@@ -86,19 +87,19 @@ impl Wall {
         })
     }
 
-    /// Corners of tetrahedron `tet`.
+    /// Corners of tetrahedron `tet`, mm.
     pub fn corners(&self, tet: usize) -> [Vec3; 4] {
         self.tets[tet].map(|node| self.nodes[node as usize])
     }
 }
 
-/// The three tetrahedra below triangle `t` in `layer`, of positive volume if the prism is sound.
+/// Three tetrahedra below triangle `t` in `layer`, of positive volume if the prism is sound.
 fn prism(t: [u32; 3], layer: usize, n_points: u32) -> [[u32; 4]; 3] {
     let lowest = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
     let [a, b, c] =
         [t[lowest], t[(lowest + 1) % 3], t[(lowest + 2) % 3]].map(|p| p + layer as u32 * n_points);
     let [d, e, f] = [a, b, c].map(|p| p + n_points);
-    // Diagonals start at a, the lowest; the one of side bc at the lower of b and c.
+    // Diagonals start at a, the lowest; that of side bc starts at the lower of b and c.
     if b < c {
         [[a, e, d, f], [a, b, e, f], [a, b, f, c]]
     } else {
@@ -118,7 +119,7 @@ fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) ->
         let depth = t.map(|i| depth_mm[i as usize]).iter().sum::<f64>() / 3.0;
         let straight_6 = (b - a).cross(c - a).length() * depth / n_layers as f64;
         let mut tets = (0..n_layers).flat_map(|layer| prism(*t, layer, n_points));
-        // A triangle of no area or of points that are no numbers is bad as well.
+        // A triangle without area, or with points that are not finite, is bad as well.
         let is_sound =
             |tet: [u32; 4]| straight_6 > 0.0 && volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6;
         tets.any(|tet| !is_sound(tet))
@@ -130,7 +131,7 @@ fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) ->
         .collect()
 }
 
-/// Makes the wall thinner below bad triangles, alike on both sides of a seam.
+/// Makes the wall thinner below bad triangles, equally on both sides of a seam.
 fn thin(assembly: &ShellAssembly, bad: &[u32], depth_mm: &mut [f64], least_mm: f64) {
     let mut is_hit = vec![false; depth_mm.len()];
     for &triangle in bad {
