@@ -57,6 +57,62 @@ fn off(mesh: &TriMesh) -> String {
     text
 }
 
+/// The body with two materials, left and right.
+fn two_materials(left: &str, right: &str) -> String {
+    let mesh = body();
+    let mut text = String::new();
+    for p in &mesh.points {
+        writeln!(text, "v {} {} {}", p.x, p.y, p.z).expect("memory takes all");
+    }
+    for (name, is_left) in [(left, true), (right, false)] {
+        writeln!(text, "usemtl {name}").expect("memory takes all");
+        let own = (0..mesh.triangles.len()).filter(|&f| (mesh.face_center(f).x < 0.0) == is_left);
+        for [a, b, c] in own.map(|f| mesh.triangles[f]) {
+            writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("memory takes all");
+        }
+    }
+    text
+}
+
+/// A prism 30 × 30 × 20 mm whose ends are polygons in the shape of a U.
+fn notch() -> String {
+    let u = [
+        [0, 0],
+        [30, 0],
+        [30, 30],
+        [20, 30],
+        [20, 10],
+        [10, 10],
+        [10, 30],
+        [0, 30],
+    ];
+    let mut text = String::new();
+    for z in [0, 20] {
+        for [x, y] in u {
+            writeln!(text, "v {x} {y} {z}").expect("memory takes all");
+        }
+    }
+    text += "f 8 7 6 5 4 3 2 1\nf 9 10 11 12 13 14 15 16\n";
+    for i in 0..8 {
+        let j = (i + 1) % 8;
+        writeln!(text, "f {} {} {} {}", i + 1, j + 1, j + 9, i + 9).expect("memory takes all");
+    }
+    text
+}
+
+fn point_coloured_off() -> String {
+    let mesh = body();
+    let mut text = format!("COFF\n{} {} 0\n", mesh.points.len(), mesh.triangles.len());
+    for p in &mesh.points {
+        let [r, g, b] = color(*p);
+        writeln!(text, "{} {} {} {r} {g} {b} 255", p.x, p.y, p.z).expect("memory takes all");
+    }
+    for [a, b, c] in &mesh.triangles {
+        writeln!(text, "3 {a} {b} {c}").expect("memory takes all");
+    }
+    text
+}
+
 /// All cases of plain formats.
 pub fn cases() -> Vec<Case> {
     let as_floats = |p: Vec3| {
@@ -106,6 +162,42 @@ pub fn cases() -> Vec<Case> {
         Case::new("stray_point.obj", stray.into_bytes())
             .says(&[WHOLE])
             .proves("OBJ", "left out", "points that no face uses"),
+        Case::new(
+            "unknown_statement.obj",
+            (obj(&body(), |_| String::new()) + "surf 0 1 0 1 1 2 3 4\n").into_bytes(),
+        )
+        .says(&[WHOLE, Note("\"surf\"")])
+        .proves("OBJ", "left out", "statements that are not known"),
+        Case::new(
+            "number_sign.obj",
+            two_materials("paint #1", "paint #2").into_bytes(),
+        )
+        .says(&[WHOLE, Labels("materials")])
+        .proves("OBJ", "read", "names with any characters"),
+        Case::new("notch.obj", notch().into_bytes())
+            .says(&[Size([30.0, 30.0, 20.0])])
+            .proves("all", "read", "polygons with notches"),
+        Case::new(
+            "one_after_the_other.stl",
+            [body(), moved(&body(), Vec3::X * 90.0)]
+                .map(|m| write_stl_binary(&m))
+                .concat(),
+        )
+        .says(&[Note("2 STL files"), Refused("2 separate bodies")])
+        .proves("STL", "read", "several binary files one after the other"),
+        Case::new(
+            "text_after.stl",
+            [
+                write_stl_binary(&body()),
+                b"solid x\n facet normal 0 0 0\n".repeat(3),
+            ]
+            .concat(),
+        )
+        .says(&[Refused("a text after the triangles")])
+        .proves("STL", "refused", "text after the triangles of a binary file"),
+        Case::new("colours_of_points.off", point_coloured_off().into_bytes())
+            .says(&[WHOLE, Labels("colors")])
+            .proves("OFF", "read", "colours of points"),
         Case::new("colours.off", off(&body()).into_bytes())
             .says(&[WHOLE, Labels("colors")])
             .proves("OFF", "read", "colours of faces"),
