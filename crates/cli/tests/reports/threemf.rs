@@ -163,7 +163,7 @@ fn marks() -> Vec<Case> {
         marked("cura_cutting.3mf", &group("cutting_mesh"), ""),
         marked(
             "cura_older.3mf",
-            "<settings xmlns=\"urn:cura\"><setting key=\"anti_overhang_mesh\">true</setting></settings>",
+            "<settings xmlns=\"http://software.ultimaker.com/xml/cura/3mf/2015/10\"><setting key=\"anti_overhang_mesh\">true</setting></settings>",
             "",
         ),
         Case::new("modifier_of_old.3mf", with(PRUSA, modifier, &joined, ITEM))

@@ -53,6 +53,13 @@ pub(super) fn of_shape(element: &str) -> Option<&'static str> {
         .map(|(_, extension)| *extension)
 }
 
+/// Whether content of a namespace is neither read nor known: its names mean what others agreed on.
+pub(super) fn is_foreign(namespace: &str) -> bool {
+    let folded = namespace.to_ascii_lowercase();
+    let is_known = KNOWN.iter().any(|known| folded.contains(known));
+    !namespace.is_empty() && !is_known && !folded.contains("/3dmanufacturing/")
+}
+
 /// Refuses a part that demands an extension that is not read.
 ///
 /// `required` holds prefixes, `namespaces` what they stand for.

@@ -5,6 +5,7 @@
 mod build;
 mod extension;
 mod model;
+mod namespace;
 mod package;
 mod part;
 mod role;

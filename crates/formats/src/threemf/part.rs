@@ -1,6 +1,6 @@
 //! One model part of a package, element by element.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use glam::{DAffine3, DVec3};
 use quick_xml::events::BytesStart;
@@ -40,11 +40,13 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
     while let Some(next) = reader.elements.next()? {
         match next {
             Next::Begin(element) => {
-                has_model |= element.local_name().as_ref() == "model";
+                has_model |= reader.is_model(&element);
                 reader.begin(&element)?;
             }
             Next::Text(text) => reader.take_text(&text),
             Next::End(name) => reader.end(&name),
+            // A shape of others is told, and refused where an object has no other.
+            Next::Foreign(name) => reader.note_foreign(name),
         }
     }
     if has_model {
@@ -82,6 +84,11 @@ struct Open {
 }
 
 impl PartReader<'_, '_> {
+    /// Whether `element` is the model of the part: the outermost element.
+    fn is_model(&self, element: &BytesStart) -> bool {
+        self.open.path.is_empty() && element.local_name().as_ref() == "model"
+    }
+
     fn begin(&mut self, element: &BytesStart) -> Result<(), ReadError> {
         let name = element.local_name().as_ref().to_owned();
         if GROUPS.contains(&&name[..]) {
@@ -93,7 +100,7 @@ impl PartReader<'_, '_> {
         }
         self.note_shape(&name);
         match &name[..] {
-            "model" => self.read_model(element)?,
+            "model" if self.is_model(element) => self.read_model(element)?,
             "colorgroup" => self.open.color_group = Some((self.id_of(element)?, Vec::new())),
             "color" => {
                 let color = self.elements.string(element, "color")?;
@@ -103,7 +110,10 @@ impl PartReader<'_, '_> {
             }
             "object" => self.open.object = Some(self.read_object(element)?),
             "item" => self.open.item = Some(self.read_item(element)?),
-            "metadata" => self.open.key = Some(self.elements.string(element, "name")?),
+            "metadata" => {
+                let key = self.elements.string(element, "name")?;
+                self.open.key = Some(key).filter(|key| !self.elements.is_foreign(key));
+            }
             "setting" => self.open.key = Some(self.elements.string(element, "key")?),
             _ => self.begin_in_object(&name, element)?,
         }
@@ -138,6 +148,14 @@ impl PartReader<'_, '_> {
             Some(shape) => object.unread = object.unread.or(Some(shape)),
             None if is_child && !OBJECT_CHILDREN.contains(&name) => object.unknown = Some(name.to_owned()),
             None => {}
+        }
+    }
+
+    /// Remembers an element of a namespace that is not read, where it stands in the open object itself.
+    fn note_foreign(&mut self, name: String) {
+        let is_child = self.open.path.last().is_some_and(|parent| parent == "object");
+        if let Some(object) = self.open.object.as_mut().filter(|_| is_child) {
+            object.unknown = Some(name);
         }
     }
 
@@ -177,7 +195,7 @@ impl PartReader<'_, '_> {
     }
 
     fn read_model(&mut self, element: &BytesStart) -> Result<(), ReadError> {
-        let namespaces: BTreeMap<String, String> = self.elements.namespaces(element)?;
+        let namespaces = self.elements.namespaces();
         extension::check_required(&self.elements.string(element, "requiredextensions")?, &namespaces)?;
         let unit = self.elements.string(element, "unit")?;
         self.model.unit_is_stated = !unit.is_empty();

@@ -97,7 +97,7 @@ impl Settings {
         while let Ok(Some(next)) = elements.next() {
             match next {
                 Next::Begin(element) => self.begin(&elements, &element, &mut open),
-                Next::Text(_) => {}
+                Next::Text(_) | Next::Foreign(_) => {}
                 Next::End(name) => self.end(&name, &mut open),
             }
         }

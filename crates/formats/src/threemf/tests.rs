@@ -7,13 +7,14 @@ use super::*;
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 
+mod foreign;
 mod roles;
 
 /// Where PrusaSlicer, and where Bambu Studio have their settings.
 const PRUSA: &str = "Metadata/Slic3r_PE_model.config";
 const BAMBU: &str = "Metadata/model_settings.config";
 const HEAD: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
-<m:model unit="inch" xmlns:m="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="x"><m:resources>"#;
+<m:model unit="inch" xmlns:m="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"><m:resources>"#;
 const TETRAHEDRON: &str = r#"<mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1"
  z="0"/><vertex z="1e0" y="0" x="&#48;"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/><triangle v1="0" v2="1" v3="3"/>
  <triangle v1="1" v2="2" v3="3"></triangle><triangle v1="0" v2="3" v3="2"/></triangles></mesh>"#;
