@@ -134,9 +134,19 @@ pub enum ReadError {
         /// Why.
         reason: String,
     },
+    /// A plate of which nothing is printed.
+    #[error("plate {plate} holds nothing that the slicer is to print; what is printed lies on: {has}")]
+    EmptyPlate {
+        /// The number or name asked for.
+        plate: String,
+        /// Plates of which something is printed.
+        has: String,
+    },
     /// No object, or no plate, of the name asked for.
-    #[error("the file has no {what} \"{wanted}\"; it has {has}")]
+    #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {
+        /// "the file" or "plate 1".
+        within: String,
         /// "object" or "plate".
         what: &'static str,
         /// The name asked for.

@@ -40,7 +40,7 @@ use std::fmt;
 pub use error::ReadError;
 pub use labels::{read_labels, write_labels};
 pub use ply::write_ply;
-pub use select::Selection;
+pub use select::{Selection, Titles};
 pub use stl::write_stl_binary;
 pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 
@@ -65,6 +65,8 @@ pub struct Loaded {
     pub unit_is_stated: bool,
     /// Objects of the file, by the labels of [`LabelSource::Object`]; empty where the format has no names.
     pub objects: Vec<FileObject>,
+    /// Plates of the slicer's project on which nothing is to be printed.
+    pub empty_plates: Vec<FilePlate>,
     /// Parts that are still to be cut out of others; [`read_mesh`] has done it.
     pub cutters: Vec<Cutter>,
     /// What a person should know about how the bytes were taken.

@@ -113,6 +113,7 @@ impl Polygons {
             unit_mm: None,
             unit_is_stated: false,
             objects: Vec::new(),
+            empty_plates: Vec::new(),
             cutters: Vec::new(),
             notes: Vec::new(),
         })

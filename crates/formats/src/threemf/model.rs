@@ -135,7 +135,6 @@ impl Model {
             model.items = items;
             (model.unit_mm, model.unit_is_stated) = unit;
         }
-        model.leave_out_switched_off();
         Ok(model)
     }
 
@@ -166,16 +165,5 @@ impl Model {
         let text = package.text(name)?.ok_or_else(missing)?;
         self.parts.push(name.to_owned());
         part::read(name, &text, self)
-    }
-
-    /// Leaves out items that the slicer is not to print, unless there are no others.
-    fn leave_out_switched_off(&mut self) {
-        let n_off = self.items.iter().filter(|item| !item.is_printed).count();
-        if n_off > 0 && n_off < self.items.len() {
-            self.items.retain(|item| item.is_printed);
-            self.notes.push(format!(
-                "objects that the slicer is not to print: {n_off}; left out"
-            ));
-        }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use quick_xml::events::BytesStart;
 
+use super::super::FilePlate;
 use super::package::Package;
 use super::role::{Role, Usage};
 use super::xml::{Elements, Next, number};
@@ -89,6 +90,11 @@ impl Settings {
         self.plate_of
             .get(&(object, instance))
             .and_then(|&plate| self.plates.get(plate))
+    }
+
+    /// All plates of the project, in the order of the file.
+    pub(super) fn plates(&self) -> &[Plate] {
+        &self.plates
     }
 
     fn read_file(&mut self, name: &str, text: &str) {
@@ -187,6 +193,14 @@ impl Settings {
 }
 
 impl Plate {
+    /// The plate as those who choose one know it.
+    pub(super) fn of_file(&self) -> FilePlate {
+        FilePlate {
+            number: self.number,
+            name: self.name.clone(),
+        }
+    }
+
     fn note(&mut self, key: &str, value: &str, instance: &mut Option<(Option<u32>, u32)>) {
         match (key, instance) {
             ("plater_id", _) => self.number = value.parse().unwrap_or(0),

@@ -8,6 +8,7 @@ use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 
 mod foreign;
+mod plates;
 mod roles;
 
 /// Where PrusaSlicer, and where Bambu Studio have their settings.

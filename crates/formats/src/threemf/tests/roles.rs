@@ -19,7 +19,7 @@ fn mesh_xml(mesh: &TriMesh) -> String {
     format!("<mesh><vertices>{points}</vertices><triangles>{triangles}</triangles></mesh>")
 }
 
-fn cube(id: u32, attributes: &str) -> String {
+pub(super) fn cube(id: u32, attributes: &str) -> String {
     boxed(id, attributes, "", [0.0; 3], [10.0; 3])
 }
 
@@ -28,7 +28,7 @@ fn bar(id: u32, attributes: &str, more: &str) -> String {
     boxed(id, attributes, more, [8.0, 4.0, 4.0], [20.0, 6.0, 6.0])
 }
 
-fn items(ids: &[u32]) -> String {
+pub(super) fn items(ids: &[u32]) -> String {
     ids.iter()
         .map(|id| format!("<item objectid=\"{id}\"/>"))
         .collect()
