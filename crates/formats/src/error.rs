@@ -142,6 +142,22 @@ pub enum ReadError {
         /// Plates of which something is printed.
         has: String,
     },
+    /// An object out of which nothing can be cut.
+    #[error("negative volumes cannot be cut out of \"{object}\": {reason}")]
+    CutBody {
+        /// The object.
+        object: String,
+        /// Why.
+        reason: String,
+    },
+    /// An object of which a cut leaves nothing.
+    #[error("nothing is left of \"{object}\" after {cutters} is cut out; make what is cut out smaller")]
+    NothingLeft {
+        /// The object.
+        object: String,
+        /// What is cut out.
+        cutters: String,
+    },
     /// No object, or no plate, of the name asked for.
     #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {

@@ -175,7 +175,7 @@ fn object_names(objects: &[FileObject]) -> String {
 }
 
 /// The first of some names, and how many more there are.
-fn listed(names: Vec<String>) -> String {
+pub(super) fn listed(names: Vec<String>) -> String {
     /// Names that a message lists.
     const N_LISTED: usize = 12;
     let first = names[..names.len().min(N_LISTED)].join(", ");
