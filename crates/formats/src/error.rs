@@ -170,6 +170,25 @@ pub enum ReadError {
         /// The names that there are.
         has: String,
     },
+    /// A zip archive with a file of a 3MF in it that no relation names.
+    #[error(
+        "the file is a zip archive with a .model file in it, but no 3MF: neither does _rels/.rels name a model nor is there \
+         3D/3dmodel.model; export it again as 3MF, or unpack it and give the mesh in it"
+    )]
+    NoRoot,
+    /// Settings of a slicer that cannot be read.
+    #[error(
+        "{part}, {at}: {reason}; so the roles of parts are unknown, such as which are cut out: save the project again in the \
+         slicer, or export plain 3MF or STL"
+    )]
+    Settings {
+        /// The file within the package.
+        part: String,
+        /// Where in it.
+        at: Place,
+        /// What is wrong.
+        reason: String,
+    },
     /// A part of a 3MF package that is not what it should be.
     #[error("{part}, {at}: {reason}; export the model again")]
     Xml {

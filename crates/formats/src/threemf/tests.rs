@@ -7,6 +7,7 @@ use super::*;
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 
+mod broken;
 mod foreign;
 mod plates;
 mod roles;

@@ -134,7 +134,7 @@ impl<'a> Elements<'a> {
         element: &BytesStart,
         mut take: impl FnMut(&str, &str) -> Result<(), String>,
     ) -> Result<(), ReadError> {
-        let rivals = self.rivals(element)?;
+        let rivals = self.rivals(element);
         self.raw_attributes(element, |name, value| {
             if declared_prefix(name).is_some() || self.is_foreign(name) || rivals.contains(name) {
                 return Ok(());
@@ -144,20 +144,21 @@ impl<'a> Elements<'a> {
     }
 
     /// Full names of attributes that do not count, since another of the same local name does.
-    fn rivals(&self, element: &BytesStart) -> Result<BTreeSet<String>, ReadError> {
+    fn rivals(&self, element: &BytesStart) -> BTreeSet<String> {
         let mut rivals = BTreeSet::new();
         if !element.contains(':') {
-            return Ok(rivals);
+            return rivals;
         }
         let (mut plain, mut prefixed) = (BTreeSet::new(), Vec::new());
-        self.raw_attributes(element, |name, _| {
+        // A fault is found again where they are read for what they say.
+        let _ = self.raw_attributes(element, |name, _| {
             if !name.contains(':') {
                 plain.insert(name.to_owned());
             } else if declared_prefix(name).is_none() && !self.is_foreign(name) {
                 prefixed.push(name.to_owned());
             }
             Ok(())
-        })?;
+        });
         for name in prefixed.into_iter().filter(|name| plain.contains(local(name))) {
             let is_of_extension = OF_EXTENSIONS.contains(&local(&name));
             rivals.insert(if is_of_extension {
@@ -166,7 +167,7 @@ impl<'a> Elements<'a> {
                 name
             });
         }
-        Ok(rivals)
+        rivals
     }
 
     /// The namespaces that `element` declares, by prefix; the default one has the prefix "".
@@ -203,7 +204,8 @@ impl<'a> Elements<'a> {
             let value = attribute.value.as_ref();
             let name = attribute.key.into_inner();
             if value.contains('&') {
-                let value = quick_xml::escape::unescape(value).map_err(|e| self.error(e))?;
+                let value = coded(value);
+                let value = quick_xml::escape::unescape(&value).map_err(|e| self.error(e))?;
                 take(name, &value).map_err(|e| self.error(e))?;
             } else {
                 take(name, value).map_err(|e| self.error(e))?;
@@ -221,6 +223,21 @@ impl<'a> Elements<'a> {
             reason: reason.to_string(),
         }
     }
+}
+
+/// `value` with a code for each "&" that begins none: writers forget it, and it can mean nothing else.
+fn coded(value: &str) -> String {
+    let mut pieces = value.split('&');
+    let mut out = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let is_code = piece.split_once(';').is_some_and(|(code, _)| {
+            let word = code.strip_prefix('#').unwrap_or(code);
+            !word.is_empty() && word.bytes().all(|b| b.is_ascii_alphanumeric())
+        });
+        out.push_str(if is_code { "&" } else { "&amp;" });
+        out.push_str(piece);
+    }
+    out
 }
 
 /// A name without its prefix.

@@ -34,7 +34,12 @@ pub(super) fn items(ids: &[u32]) -> String {
         .collect()
 }
 
-fn with_settings(resources: &str, build: &str, name: &str, settings: &str) -> Result<Loaded, ReadError> {
+pub(super) fn with_settings(
+    resources: &str,
+    build: &str,
+    name: &str,
+    settings: &str,
+) -> Result<Loaded, ReadError> {
     let root = model(resources, build);
     read_mesh(&package(&[(USUAL_ROOT, &root), (name, settings)]), None)
 }
@@ -85,7 +90,7 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
 }
 
 /// A block whose second part is the object 2.
-fn parts_of(second: &str) -> String {
+pub(super) fn parts_of(second: &str) -> String {
     cube(1, "")
         + second
         + r#"<object id="3" name="block"><components><component objectid="1"/><component objectid="2"/></components></object>"#
