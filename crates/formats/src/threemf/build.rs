@@ -27,7 +27,12 @@ pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadErr
     for occurrence in &found {
         flat.add(&build, occurrence)?;
     }
-    notes.splice(0..0, model.notes.iter().cloned());
+    if !model.converted.is_empty() {
+        notes.push(format!(
+            "parts of the file in another unit than its root, all brought to the root's: {}",
+            listed(&model.converted)
+        ));
+    }
     notes.extend(flat.notes(&build));
     flat.finish(&build, notes)
 }

@@ -16,9 +16,9 @@ const MAX_PARTS: usize = 1000;
 /// All model parts of a package, read into one.
 #[derive(Default)]
 pub(super) struct Model {
-    /// mm.
+    /// Length of the root's unit, in which all lengths are; mm.
     pub(super) unit_mm: f64,
-    /// Whether the file states its unit; else it is the format's default.
+    /// Whether the root states its unit; else it is the format's default.
     pub(super) unit_is_stated: bool,
     pub(super) objects: Vec<Object>,
     /// What is built.
@@ -29,7 +29,8 @@ pub(super) struct Model {
     pub(super) groups: BTreeSet<(u32, u32)>,
     /// Those of them that are coordinates in a picture, by part and id.
     pub(super) textures: BTreeSet<(u32, u32)>,
-    pub(super) notes: Vec<String>,
+    /// Names of parts in another unit than the root's.
+    pub(super) converted: BTreeSet<String>,
     /// Names of the parts read, in order; the root is the first.
     pub(super) parts: Vec<String>,
 }
@@ -126,14 +127,10 @@ impl Model {
                     limit: MAX_PARTS as u64,
                 });
             }
-            let (items, unit) = (
-                std::mem::take(&mut model.items),
-                (model.unit_mm, model.unit_is_stated),
-            );
+            let items = std::mem::take(&mut model.items);
             model.read_part(&next, package)?;
-            // Only the root says what is built, and in which unit.
+            // Only the root says what is built.
             model.items = items;
-            (model.unit_mm, model.unit_is_stated) = unit;
         }
         Ok(model)
     }

@@ -31,6 +31,7 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
         elements: Elements::of(name, text),
         name,
         number,
+        scale: 1.0,
         first_object: model.objects.len(),
         model,
         ids: BTreeSet::new(),
@@ -61,6 +62,8 @@ struct PartReader<'a, 'm> {
     elements: Elements<'a>,
     name: &'a str,
     number: u32,
+    /// Length of the part's unit, in units of the root.
+    scale: f64,
     model: &'m mut Model,
     /// The first of the model's objects that stands in this part.
     first_object: usize,
@@ -198,8 +201,7 @@ impl PartReader<'_, '_> {
         let namespaces = self.elements.namespaces();
         extension::check_required(&self.elements.string(element, "requiredextensions")?, &namespaces)?;
         let unit = self.elements.string(element, "unit")?;
-        self.model.unit_is_stated = !unit.is_empty();
-        self.model.unit_mm = match unit.as_str() {
+        let unit_mm = match unit.as_str() {
             "micron" => 1e-3,
             "" | "millimeter" => 1.0,
             "centimeter" => 10.0,
@@ -208,6 +210,14 @@ impl PartReader<'_, '_> {
             "meter" => 1000.0,
             _ => return Err(self.elements.error("the unit is none of those that 3MF has")),
         };
+        if self.number == 0 {
+            (self.model.unit_mm, self.model.unit_is_stated) = (unit_mm, !unit.is_empty());
+        } else if unit_mm != self.model.unit_mm {
+            // The unit is an attribute of a part's own `model` and holds for all vertices and measurements in it (core
+            // specification 1.3, section 3.4); no part takes over that of another, and without one it is the millimetre.
+            self.scale = unit_mm / self.model.unit_mm;
+            self.model.converted.insert(self.name.to_owned());
+        }
         Ok(())
     }
 
@@ -267,7 +277,7 @@ impl PartReader<'_, '_> {
             }
             Ok(())
         })?;
-        let point = Vec3::from_array(point);
+        let point = Vec3::from_array(point) * self.scale;
         if point.is_finite() {
             Ok(point)
         } else {
@@ -344,6 +354,8 @@ impl PartReader<'_, '_> {
             }
             Ok(())
         })?;
+        // What it moves is in the root's unit, too: its axes turn and stretch, which has no unit.
+        component.placed.translation *= self.scale;
         Ok(component)
     }
 
