@@ -128,24 +128,24 @@ pub fn repaired(
     })
 }
 
-/// What the file calls its objects, and where they lie; nothing where there is one alone.
+/// What the file calls its objects and their parts, and where they lie; nothing where there is one alone.
 pub fn objects(loaded: &Loaded) -> Vec<String> {
-    let n_plates = loaded
-        .objects
+    let titles = loaded.titles();
+    let plates: BTreeSet<u32> = titles.iter().filter_map(|titles| titles.plate).collect();
+    let mut all: Vec<String> = titles
         .iter()
-        .filter_map(|object| Some(object.plate.as_ref()?.number))
-        .collect::<BTreeSet<u32>>()
-        .len();
-    let mut all: Vec<String> = loaded
-        .objects
-        .iter()
-        .map(|object| match &object.plate {
-            Some(plate) if n_plates > 1 => format!("\"{}\" (plate {})", object.title(), plate.number),
-            _ => format!("\"{}\"", object.title()),
+        .map(|titles| match titles.plate {
+            Some(plate) if plates.len() > 1 => format!("{titles} (plate {plate})"),
+            _ => titles.to_string(),
         })
         .collect();
     all.dedup();
-    if all.len() > 1 { all } else { Vec::new() }
+    let has_parts = loaded.objects.len() > 1 && titles.iter().any(|titles| !titles.parts.is_empty());
+    if all.len() > 1 || has_parts {
+        all
+    } else {
+        Vec::new()
+    }
 }
 
 /// The model in a file, scaled, with the labels that go with it.

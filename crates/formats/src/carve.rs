@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::select::listed;
 use super::{Cutter, Loaded, ReadError};
 use shellock_geom::TriMesh;
-use shellock_geom::repair::{CutFace, cut_out};
+use shellock_geom::repair::{CutError, CutFace, cut_out};
 
 /// Cuts all of `loaded.cutters` out of their objects.
 ///
@@ -44,18 +45,17 @@ fn carve_item(mut loaded: Loaded, item: u32, cutters: &[Cutter]) -> Result<Loade
     .without_unused_points();
     let meshes: Vec<&TriMesh> = cutters.iter().map(|cutter| &cutter.mesh).collect();
     let title = loaded.objects[object_of[first]].title();
-    let cut = cut_out(&body, &meshes).map_err(|e| ReadError::Cut {
-        name: e
-            .cutter
-            .map_or_else(|| title.clone(), |k| cutters[k].name.clone()),
-        reason: e.to_string(),
-    })?;
-    for (cutter, is_met) in cutters.iter().zip(&cut.is_met) {
+    let cut = cut_out(&body, &meshes).map_err(|error| refusal(&error, &title, cutters))?;
+    for (place, cutter) in cutters.iter().enumerate() {
         let name = &cutter.name;
-        loaded.notes.push(if *is_met {
-            format!("cut out as a negative volume: {name}")
-        } else {
-            format!("the negative volume {name} does not meet {title}: nothing is cut out")
+        loaded.notes.push(match (cut.is_met[place], cut.was_open[place]) {
+            (true, false) => format!("cut out as a negative volume: {name}"),
+            (true, true) => {
+                format!(
+                    "cut out as a negative volume: {name}; its surface had holes, which were closed before"
+                )
+            }
+            (false, _) => format!("the negative volume {name} does not meet {title}: nothing is cut out"),
         });
     }
     let n_faces = loaded.n_file_faces() as u32;
@@ -91,7 +91,26 @@ fn carve_item(mut loaded: Loaded, item: u32, cutters: &[Cutter]) -> Result<Loade
     Ok(loaded)
 }
 
-/// Index of each cutter's first face among those of the file, of which there are `n_faces` so far.
+/// Why nothing can be cut out of the object called `title`.
+fn refusal(error: &CutError, title: &str, cutters: &[Cutter]) -> ReadError {
+    let reason = error.to_string();
+    match *error {
+        CutError::Cutter(place, _) => ReadError::Cut {
+            name: cutters[place].name.clone(),
+            reason,
+        },
+        CutError::Body(_) => ReadError::CutBody {
+            object: title.to_owned(),
+            reason,
+        },
+        CutError::NothingLeft => ReadError::NothingLeft {
+            object: title.to_owned(),
+            cutters: listed(cutters.iter().map(|cutter| cutter.name.clone()).collect()),
+        },
+    }
+}
+
+/// The number of each cutter's first face among those of the file, of which there are `n_faces` so far.
 fn first_faces(n_faces: u32, cutters: &[&TriMesh]) -> Vec<u32> {
     cutters
         .iter()

@@ -134,17 +134,62 @@ pub enum ReadError {
         /// Reason why it failed.
         reason: String,
     },
-    /// A selected object or plate that does not exist.
-    #[error("the file has no {what} \"{wanted}\"; it has {has}")]
+    /// A plate of which nothing is printed.
+    #[error("plate {plate} holds nothing that the slicer is to print; what is printed lies on: {has}")]
+    EmptyPlate {
+        /// The number or name asked for.
+        plate: String,
+        /// Plates of which something is printed.
+        has: String,
+    },
+    /// An object out of which nothing can be cut.
+    #[error("negative volumes cannot be cut out of \"{object}\": {reason}")]
+    CutBody {
+        /// The object.
+        object: String,
+        /// Why.
+        reason: String,
+    },
+    /// An object of which a cut leaves nothing.
+    #[error("nothing is left of \"{object}\" after {cutters} is cut out; make what is cut out smaller")]
+    NothingLeft {
+        /// The object.
+        object: String,
+        /// What is cut out.
+        cutters: String,
+    },
+    /// No object, or no plate, of the name asked for.
+    #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {
-        /// Kind of part: "object" or "plate".
+        /// "the file" or "plate 1".
+        within: String,
+        /// "object" or "plate".
         what: &'static str,
         /// Name that was asked for.
         wanted: String,
         /// Names that the file has.
         has: String,
     },
-    /// An invalid part of a 3MF package.
+    /// A zip archive with a file of a 3MF in it that no relation names.
+    #[error(
+        "the file is a zip archive with a .model file in it, but no 3MF: neither does _rels/.rels name a model nor is there \
+         3D/3dmodel.model; export it again as 3MF, or unpack it and give the mesh in it"
+    )]
+    NoRoot,
+    /// Settings of a slicer that cannot be read.
+    #[error(
+        "{part}, {at}: {reason}; so the roles of parts are unknown, such as which are cut out: save the project again in the \
+         slicer, or export plain 3MF or STL"
+    )]
+    Settings {
+        /// The file within the package.
+        part: String,
+        /// Where in it.
+        at: Place,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A part of a 3MF package that is not what it should be.
     #[error("{part}, {at}: {reason}; export the model again")]
     Xml {
         /// File within the package.

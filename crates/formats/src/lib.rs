@@ -44,7 +44,7 @@ use std::fmt;
 pub use error::ReadError;
 pub use labels::{read_labels, write_labels};
 pub use ply::write_ply;
-pub use select::Selection;
+pub use select::{Selection, Titles};
 pub use stl::write_stl_binary;
 pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 
@@ -70,7 +70,9 @@ pub struct Loaded {
     /// Objects of the file, indexed by the labels of [`LabelSource::Object`]. Empty if the format has no
     /// names, or if an OBJ is not wholly divided into named objects.
     pub objects: Vec<FileObject>,
-    /// Parts still to be cut out of others; empty after [`read_mesh`].
+    /// Plates of the slicer's project on which nothing is to be printed.
+    pub empty_plates: Vec<FilePlate>,
+    /// Parts that are still to be cut out of others; [`read_mesh`] has done it.
     pub cutters: Vec<Cutter>,
     /// Notes for the user about how the bytes were read.
     pub notes: Vec<String>,

@@ -116,6 +116,7 @@ impl Polygons {
             unit_mm: None,
             unit_is_stated: false,
             objects: Vec::new(),
+            empty_plates: Vec::new(),
             cutters: Vec::new(),
             notes: Vec::from_iter((n_folded > 0).then(|| {
                 format!(

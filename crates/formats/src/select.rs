@@ -1,9 +1,10 @@
 //! Selection of one object, or one plate, of a file that has several.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use super::polygons::divides;
-use super::{FileObject, LabelSource, Loaded, ReadError};
+use super::{FileObject, FilePlate, Format, LabelSource, Loaded, ReadError};
 
 /// Selected part of a file; the default selects all of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,62 +27,162 @@ impl FileObject {
         let is_same = |name: &str| name.to_lowercase() == wanted.trim().to_lowercase();
         is_same(&self.title()) || self.part.as_deref().is_some_and(is_same)
     }
+}
 
-    fn is_on(&self, wanted: &str) -> bool {
-        self.plate.as_ref().is_some_and(|plate| {
-            plate.number.to_string() == wanted.trim()
-                || plate
-                    .name
-                    .as_ref()
-                    .is_some_and(|name| name.to_lowercase() == wanted.trim().to_lowercase())
-        })
+/// What an object is called, and what its parts are called.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Titles {
+    /// Of the object.
+    pub object: String,
+    /// Names of its parts that differ from it, each once.
+    pub parts: Vec<String>,
+    /// Number of the plate that it lies on.
+    pub plate: Option<u32>,
+}
+
+impl fmt::Display for Titles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\"{}\"", self.object)?;
+        if self.parts.is_empty() {
+            return Ok(());
+        }
+        let parts = self.parts.iter().map(|part| format!("\"{part}\""));
+        write!(f, " with the parts {}", listed(parts.collect()))
     }
 }
 
-/// Returns the selected part of `loaded`; an error that lists the alternatives if there is none.
-pub(super) fn select(loaded: Loaded, selection: &Selection) -> Result<Loaded, ReadError> {
-    let mut is_wanted = vec![true; loaded.objects.len()];
-    for (what, wanted, fits) in [
-        (
-            "plate",
-            &selection.plate,
-            FileObject::is_on as fn(&FileObject, &str) -> bool,
-        ),
-        ("object", &selection.object, FileObject::is_called),
-    ] {
-        let Some(wanted) = wanted else { continue };
+/// What each of some objects and its parts are called, in their order.
+fn titles(objects: &[FileObject]) -> Vec<Titles> {
+    let mut all: Vec<Titles> = Vec::new();
+    let (mut last_item, mut known) = (None, BTreeSet::new());
+    for object in objects {
+        if last_item.replace(object.item) != Some(object.item) {
+            known = BTreeSet::from([object.title()]);
+            all.push(Titles {
+                object: object.title(),
+                parts: Vec::new(),
+                plate: object.plate.as_ref().map(|plate| plate.number),
+            });
+        }
+        let part = object.part.clone().filter(|part| known.insert(part.clone()));
+        if let Some(titles) = all.last_mut() {
+            titles.parts.extend(part);
+        }
+    }
+    all
+}
+
+/// The part of `loaded` that is wanted.
+pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded, ReadError> {
+    let n = loaded.objects.len();
+    let mut is_wanted = vec![true; n];
+    if let Some(wanted) = &selection.plate {
+        is_wanted = on_plate(&loaded, wanted)?;
+    }
+    if let Some(wanted) = &selection.object {
+        let within = loaded.objects.iter().zip(&is_wanted).filter(|(_, is_in)| **is_in);
+        let there: Vec<FileObject> = within.map(|(object, _)| object.clone()).collect();
         for (object, is_wanted) in loaded.objects.iter().zip(&mut is_wanted) {
-            *is_wanted &= fits(object, wanted);
+            *is_wanted &= object.is_called(wanted);
         }
         if !is_wanted.contains(&true) {
+            let plate = selection.plate.as_ref();
             return Err(ReadError::NoSuchPart {
-                what,
+                within: plate.map_or_else(
+                    || "the file".to_owned(),
+                    |plate| format!("plate {}", plate.trim()),
+                ),
+                what: "object",
                 wanted: wanted.clone(),
-                has: titles(&loaded.objects, what),
+                has: object_names(&there),
             });
         }
     }
-    if is_wanted.contains(&false) {
-        Ok(keep(loaded, &is_wanted))
+    let n_wanted = is_wanted.iter().filter(|wanted| **wanted).count();
+    if n_wanted < n {
+        let were = if n_wanted == 1 { "was" } else { "were" };
+        let note = format!("{n_wanted} of {n} objects or parts {were} taken");
+        loaded = keep(loaded, &is_wanted);
+        loaded.notes.push(note);
+    } else if n > 1 && loaded.format == Format::ThreeMf {
+        let names: BTreeSet<&String> = loaded.objects.iter().filter_map(|o| o.name.as_ref()).collect();
+        let named = if names.is_empty() {
+            String::new()
+        } else {
+            format!(": {}", listed(names.into_iter().cloned().collect()))
+        };
+        loaded
+            .notes
+            .push(format!("the file has {n} objects or parts; all were read{named}"));
+    }
+    Ok(loaded)
+}
+
+/// Which objects lie on the plate of this number; of this name where no plate has the number.
+fn on_plate(loaded: &Loaded, wanted: &str) -> Result<Vec<bool>, ReadError> {
+    let folded = wanted.trim().to_lowercase();
+    let has_number = |plate: &FilePlate| plate.number.to_string() == folded;
+    let has_name = |plate: &FilePlate| plate.name.as_ref().is_some_and(|n| n.to_lowercase() == folded);
+    let plates = || loaded.objects.iter().filter_map(|object| object.plate.as_ref());
+    let is_number = plates().chain(&loaded.empty_plates).any(has_number);
+    let fits = |plate: &FilePlate| {
+        if is_number {
+            has_number(plate)
+        } else {
+            has_name(plate)
+        }
+    };
+    let of_object = |object: &FileObject| object.plate.as_ref().is_some_and(fits);
+    let is_on: Vec<bool> = loaded.objects.iter().map(of_object).collect();
+    if is_on.contains(&true) {
+        return Ok(is_on);
+    }
+    let names: BTreeSet<String> = plates().map(plate_name).collect();
+    let has = if names.is_empty() {
+        "no plates".to_owned()
     } else {
-        Ok(loaded)
+        listed(names.into_iter().collect())
+    };
+    if loaded.empty_plates.iter().any(fits) {
+        return Err(ReadError::EmptyPlate {
+            plate: wanted.trim().to_owned(),
+            has,
+        });
+    }
+    Err(ReadError::NoSuchPart {
+        within: "the file".to_owned(),
+        what: "plate",
+        wanted: wanted.to_owned(),
+        has,
+    })
+}
+
+/// Number and name of a plate.
+fn plate_name(plate: &FilePlate) -> String {
+    match &plate.name {
+        Some(name) => format!("{} \"{name}\"", plate.number),
+        None => plate.number.to_string(),
     }
 }
 
-/// Names of all objects, or of all plates, in the form that can be asked for.
-fn titles(objects: &[FileObject], what: &str) -> String {
-    let title = |object: &FileObject| match what {
-        "plate" => object.plate.as_ref().map(|plate| match &plate.name {
-            Some(name) => format!("{} \"{name}\"", plate.number),
-            None => plate.number.to_string(),
-        }),
-        _ => Some(format!("\"{}\"", object.title())),
-    };
-    let all: BTreeSet<String> = objects.iter().filter_map(title).collect();
+/// Names of objects and their parts, as they can be asked for.
+fn object_names(objects: &[FileObject]) -> String {
+    let all: BTreeSet<String> = titles(objects).iter().map(Titles::to_string).collect();
     if all.is_empty() {
-        return format!("no {what}s with names");
+        return "no objects with names".to_owned();
     }
-    all.into_iter().collect::<Vec<_>>().join(", ")
+    listed(all.into_iter().collect())
+}
+
+/// The first of some names, and how many more there are.
+pub(super) fn listed(names: Vec<String>) -> String {
+    /// Names that a message lists.
+    const N_LISTED: usize = 12;
+    let first = names[..names.len().min(N_LISTED)].join(", ");
+    match names.len().saturating_sub(N_LISTED) {
+        0 => first,
+        n => format!("{first} and {n} more"),
+    }
 }
 
 /// Keeps the selected objects and renumbers their faces.
@@ -126,7 +227,12 @@ fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
 }
 
 impl Loaded {
-    /// Returns the object of each triangle, as an index into [`Loaded::objects`].
+    /// What the file's objects and their parts are called, in their order.
+    pub fn titles(&self) -> Vec<Titles> {
+        titles(&self.objects)
+    }
+
+    /// For each triangle the object that it belongs to, a place in [`Loaded::objects`].
     pub(super) fn object_of_triangle(&self) -> Vec<usize> {
         self.labels(LabelSource::Object).map_or_else(
             || vec![0; self.mesh.triangles.len()],

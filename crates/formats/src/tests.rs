@@ -78,6 +78,7 @@ fn every_format_gives_the_tetrahedron_back() {
                 unit_mm: None,
                 unit_is_stated: false,
                 objects: Vec::new(),
+                empty_plates: Vec::new(),
                 cutters: Vec::new(),
                 notes
             }

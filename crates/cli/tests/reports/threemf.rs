@@ -93,6 +93,7 @@ pub fn cases() -> Vec<Case> {
         plates(),
         attributes(),
         sizes(),
+        told(),
     ]
     .concat()
 }
@@ -140,6 +141,54 @@ fn negative() -> Vec<Case> {
     ]
 }
 
+/// Files of which a wrong part, size or role would be taken without a word.
+fn told() -> Vec<Case> {
+    let [a, b] = two();
+    let part = object(1, "", &mesh(&a, ""));
+    let vendor = "unit=\"millimeter\" x:unit=\"inch\" xmlns:x=\"urn:vendor\"";
+    let added = part.replace(
+        "</mesh>",
+        "<x:vertices><vertex x=\"99\" y=\"0\" z=\"0\"/></x:vertices></mesh>",
+    );
+    let build = "<item objectid=\"1\" x:transform=\"2 0 0 0 2 0 0 0 2 0 0 0\"/><x:alt><x:item objectid=\"7\"/></x:alt>";
+    let parts = part.clone()
+        + &object(2, "", &mesh(&b, ""))
+        + &object(
+            3,
+            "",
+            "<components><component objectid=\"1\"/><component objectid=\"2\"/></components>",
+        );
+    let cut_off = "<config><object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/><part id=\"2\" subtype=";
+    let from = object(
+        1,
+        "",
+        "<components><component p:path=\"/3D/o.model\" objectid=\"1\"/></components>",
+    );
+    let small = object(1, "", &mesh(&scaled(&a, Vec3::splat(0.1)), ""));
+    let off = plain(&part, "<item objectid=\"1\" printable=\"0\"/>");
+    vec![
+        Case::new("vendor.3mf", package(&[(ROOT, &model(vendor, &added, build))]))
+            .says(&[WHOLE])
+            .proves("3MF", "left out", "what others add in namespaces of their own"),
+        Case::new(
+            "settings_cut_off.3mf",
+            with(BAMBU, cut_off, &parts, "<item objectid=\"3\"/>"),
+        )
+        .says(&[Refused("the roles of parts are unknown")])
+        .proves("3MF", "refused", "settings of slicers that cannot be read"),
+        Case::new(
+            "unit_of_its_own.3mf",
+            package(&[
+                (ROOT, &model("unit=\"millimeter\"", &from, ITEM)),
+                ("3D/o.model", &model("unit=\"centimeter\"", &small, "")),
+            ]),
+        )
+        .says(&[WHOLE, Note("another unit than its root")])
+        .proves("3MF", "read", "files with units of their own"),
+        Case::new("all_switched_off.3mf", off).says(&[WHOLE, Note("every object is switched off")]),
+    ]
+}
+
 fn marks() -> Vec<Case> {
     let [a, b] = two();
     let marked = |name: &'static str, of_object: &str, of_item: &str| {
@@ -163,7 +212,7 @@ fn marks() -> Vec<Case> {
         marked("cura_cutting.3mf", &group("cutting_mesh"), ""),
         marked(
             "cura_older.3mf",
-            "<settings xmlns=\"urn:cura\"><setting key=\"anti_overhang_mesh\">true</setting></settings>",
+            "<settings xmlns=\"http://software.ultimaker.com/xml/cura/3mf/2015/10\"><setting key=\"anti_overhang_mesh\">true</setting></settings>",
             "",
         ),
         Case::new("modifier_of_old.3mf", with(PRUSA, modifier, &joined, ITEM))
@@ -421,7 +470,29 @@ fn plates() -> Vec<Case> {
         &by_name,
         "<item objectid=\"1\"/><item objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 90 0 0\"/>",
     );
+    let off = with(
+        BAMBU,
+        &settings,
+        &resources,
+        &build.replacen("<item", "<item printable=\"0\"", 1),
+    );
+    let pair = with(
+        BAMBU,
+        "<config><object id=\"4\"><metadata key=\"name\" value=\"thing\"/><part id=\"1\"><metadata key=\"name\" value=\"Body\"/></part>\
+         <part id=\"2\"><metadata key=\"name\" value=\"Base\"/></part></object></config>",
+        &(resources.clone()
+            + &object(
+                4,
+                "",
+                "<components><component objectid=\"1\"/><component objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 90 0 0\"/></components>",
+            )),
+        "<item objectid=\"4\"/>",
+    );
     vec![
+        Case::new("parts_apart.3mf", pair).says(&[Refused("\"thing\" with the parts \"Body\", \"Base\"")]),
+        Case::new("plate_off.3mf", off)
+            .with(&["--plate", "1"])
+            .says(&[Refused("plate 1 holds nothing that the slicer is to print")]),
         Case::new("plates.3mf", bytes.clone()).says(&[Refused(
             "\"cat\" (plate 1), \"dog\" (plate 2), \"base\" (plate 3)",
         )]),

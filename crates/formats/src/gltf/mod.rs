@@ -182,6 +182,7 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
         unit_mm: Some(UNIT_MM),
         unit_is_stated: false,
         objects: surface.objects,
+        empty_plates: Vec::new(),
         cutters: Vec::new(),
         notes,
     };

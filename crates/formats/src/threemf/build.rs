@@ -8,7 +8,7 @@ use super::super::assembly::{Occurrence, Part, occurrences};
 use super::super::paint::{self, Painted};
 use super::super::polygons::{Numbering, divides};
 use super::super::{Cutter, FileObject, FilePlate, Format, LabelSource, Labelling, Loaded, Place, ReadError};
-use super::model::{Model, Object, Property};
+use super::model::{Item, Model, Object, Property};
 use super::role::{Role, Usage};
 use super::settings::{ObjectSettings, Settings};
 use shellock_geom::{TriMesh, Vec3};
@@ -27,9 +27,14 @@ pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadErr
     for occurrence in &found {
         flat.add(&build, occurrence)?;
     }
-    notes.splice(0..0, model.notes.iter().cloned());
+    if !model.converted.is_empty() {
+        notes.push(format!(
+            "parts of the file in another unit than its root, all brought to the root's: {}",
+            listed(&model.converted)
+        ));
+    }
     notes.extend(flat.notes(&build));
-    flat.finish(model, notes)
+    flat.finish(&build, notes)
 }
 
 /// Objects ready to be placed.
@@ -38,8 +43,11 @@ struct Build<'a> {
     bodies: Vec<Body<'a>>,
     /// Index of an object in the model, by its model part and id.
     place_of: BTreeMap<(&'a str, u32), usize>,
-    /// Plate of each build item.
+    settings: &'a Settings,
+    /// Where each item of the build lies.
     plates: Vec<Option<FilePlate>>,
+    /// Which items are made.
+    is_made: Vec<bool>,
 }
 
 /// An object divided along its paint, with the slicer's settings for it.
@@ -68,14 +76,13 @@ impl<'a> Build<'a> {
             let instance = n_items.entry((path, id)).or_default();
             *instance += 1;
             let plate = settings.plate(id, *instance - 1).filter(|_| path == root)?;
-            Some(FilePlate {
-                number: plate.number,
-                name: plate.name.clone(),
-            })
+            Some(plate.of_file())
         });
         Ok(Self {
             model,
+            settings,
             plates: plates.collect(),
+            is_made: is_made(&model.items),
             bodies: bodies.collect::<Result<_, _>>()?,
             place_of: place_of.map(|(i, o)| ((&o.path[..], o.id), i)).collect(),
         })
@@ -118,7 +125,24 @@ impl<'a> Build<'a> {
         })
     }
 
-    /// Returns the objects of the build, or all top-level ones with a note if the build is empty.
+    /// A note on items that the slicer is not to print.
+    fn off_note(&self) -> Option<String> {
+        let n_off = self.model.items.iter().filter(|item| !item.is_printed).count();
+        if n_off == 0 {
+            None
+        } else if n_off == self.model.items.len() {
+            Some(
+                "every object is switched off, so that the slicer would print nothing; all were taken"
+                    .to_owned(),
+            )
+        } else {
+            Some(format!(
+                "objects that the slicer is not to print: {n_off}; left out"
+            ))
+        }
+    }
+
+    /// The objects that are built, and a note where the file does not say which.
     fn roots(&self) -> Result<(Vec<Occurrence<Usage<'_>>>, Vec<String>), ReadError> {
         let root = |part: usize, placed: DAffine3, item: usize| Occurrence {
             part,
@@ -130,6 +154,9 @@ impl<'a> Build<'a> {
         };
         let mut roots = Vec::new();
         for (number, item) in self.model.items.iter().enumerate() {
+            if !self.is_made[number] {
+                continue;
+            }
             let part = self.find(&item.component.path, item.component.id)?;
             let mut of_item = root(part, item.component.placed, number);
             of_item.said = of_item.said.with(Usage {
@@ -140,7 +167,7 @@ impl<'a> Build<'a> {
             roots.push(of_item);
         }
         if !roots.is_empty() {
-            return Ok((roots, Vec::new()));
+            return Ok((roots, self.off_note().into_iter().collect()));
         }
         let mut is_child = vec![false; self.bodies.len()];
         for component in self.model.objects.iter().flat_map(|o| &o.components) {
@@ -219,7 +246,14 @@ impl<'a> Body<'a> {
     }
 }
 
-/// Named set of each triangle of an object, −1 for none; the first if there are several.
+/// Which items are made: those that the slicer is to print, or all where there are none of them. Those that are not
+/// stay in the list, since slicers count them.
+fn is_made(items: &[Item]) -> Vec<bool> {
+    let prints = items.iter().any(|item| item.is_printed);
+    items.iter().map(|item| item.is_printed || !prints).collect()
+}
+
+/// The named set of each triangle of an object; none where it is −1, the first where there are several.
 fn sets(object: &Object) -> Vec<i64> {
     /// Largest mean number of sets per triangle; further ones are hostile and are skipped.
     const MAX_OVERLAP: usize = 8;
@@ -353,16 +387,6 @@ impl Flat {
     /// Notes for the user on what was read and what was not.
     fn notes(&self, build: &Build) -> Vec<String> {
         let mut notes = Vec::new();
-        if self.objects.len() > 1 {
-            let n = self.objects.len();
-            let names: BTreeSet<String> = self.objects.iter().filter_map(|o| o.name.clone()).collect();
-            let named = if names.is_empty() {
-                String::new()
-            } else {
-                format!(": {}", listed(&names))
-            };
-            notes.push(format!("the file has {n} objects or parts; all were read{named}"));
-        }
         for (role, names) in &self.left_out {
             notes.push(format!("left out as {}: {}", role.words(), listed(names)));
         }
@@ -385,7 +409,8 @@ impl Flat {
         notes
     }
 
-    fn finish(self, model: &Model, notes: Vec<String>) -> Result<Loaded, ReadError> {
+    fn finish(self, build: &Build, notes: Vec<String>) -> Result<Loaded, ReadError> {
+        let model = build.model;
         if self.mesh.triangles.is_empty() {
             if let Some((role, names)) = self.left_out.first_key_value() {
                 return Err(ReadError::NothingPrinted {
@@ -406,6 +431,7 @@ impl Flat {
             (LabelSource::Object, self.object),
         ];
         let labellings = all.into_iter().filter(|(_, labels)| divides(labels));
+        let empty_plates = build.empty_plates(&self.objects);
         Ok(Loaded {
             mesh: self.mesh,
             labellings: labellings
@@ -416,6 +442,7 @@ impl Flat {
             unit_mm: Some(model.unit_mm),
             unit_is_stated: model.unit_is_stated,
             objects: self.objects,
+            empty_plates,
             cutters: self.cutters,
             notes,
         })
@@ -423,7 +450,20 @@ impl Flat {
 }
 
 impl Build<'_> {
-    /// Name of the object of a build item.
+    /// Plates on which none of `objects` lies.
+    fn empty_plates(&self, objects: &[FileObject]) -> Vec<FilePlate> {
+        let taken: BTreeSet<u32> = objects
+            .iter()
+            .filter_map(|o| Some(o.plate.as_ref()?.number))
+            .collect();
+        let plates = self.settings.plates().iter();
+        plates
+            .filter(|plate| !taken.contains(&plate.number))
+            .map(|plate| plate.of_file())
+            .collect()
+    }
+
+    /// What the object of an item is called.
     fn item_name(&self, item: u32) -> Option<String> {
         let component = &self.model.items.get(item as usize)?.component;
         let part = self.find(&component.path, component.id).ok()?;

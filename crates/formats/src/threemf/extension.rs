@@ -53,7 +53,14 @@ pub(super) fn of_shape(element: &str) -> Option<&'static str> {
         .map(|(_, extension)| *extension)
 }
 
-/// Returns an error if a part demands an unsupported extension.
+/// Whether content of a namespace is neither read nor known: its names mean what others agreed on.
+pub(super) fn is_foreign(namespace: &str) -> bool {
+    let folded = namespace.to_ascii_lowercase();
+    let is_known = KNOWN.iter().any(|known| folded.contains(known));
+    !namespace.is_empty() && !is_known && !folded.contains("/3dmanufacturing/")
+}
+
+/// Refuses a part that demands an extension that is not read.
 ///
 /// `required` holds prefixes, and `namespaces` their namespaces.
 pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, String>) -> Result<(), ReadError> {

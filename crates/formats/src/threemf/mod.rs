@@ -5,6 +5,7 @@
 mod build;
 mod extension;
 mod model;
+mod namespace;
 mod package;
 mod part;
 mod role;
@@ -27,7 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     if model.objects.is_empty() && package.has_tool_paths() {
         return Err(ReadError::Sliced);
     }
-    let settings = Settings::read(&mut package);
+    let settings = Settings::read(&mut package)?;
     build::read(&model, &settings)
 }
 

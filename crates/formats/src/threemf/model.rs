@@ -16,9 +16,9 @@ const MAX_PARTS: usize = 1000;
 /// All model parts of a package, combined.
 #[derive(Default)]
 pub(super) struct Model {
-    /// Length of a file unit, mm.
+    /// Length of the root's unit, in which all lengths are; mm.
     pub(super) unit_mm: f64,
-    /// True if the file states its unit. Otherwise it is the format's default.
+    /// Whether the root states its unit; else it is the format's default.
     pub(super) unit_is_stated: bool,
     pub(super) objects: Vec<Object>,
     /// Items of the build.
@@ -29,7 +29,8 @@ pub(super) struct Model {
     pub(super) groups: BTreeSet<(u32, u32)>,
     /// Groups that are texture coordinates, by part and id.
     pub(super) textures: BTreeSet<(u32, u32)>,
-    pub(super) notes: Vec<String>,
+    /// Names of parts in another unit than the root's.
+    pub(super) converted: BTreeSet<String>,
     /// Names of the parts read, in order; the root is the first.
     pub(super) parts: Vec<String>,
 }
@@ -126,16 +127,11 @@ impl Model {
                     limit: MAX_PARTS as u64,
                 });
             }
-            let (items, unit) = (
-                std::mem::take(&mut model.items),
-                (model.unit_mm, model.unit_is_stated),
-            );
+            let items = std::mem::take(&mut model.items);
             model.read_part(&next, package)?;
-            // Only the root defines the build and its unit.
+            // Only the root says what is built.
             model.items = items;
-            (model.unit_mm, model.unit_is_stated) = unit;
         }
-        model.leave_out_switched_off();
         Ok(model)
     }
 
@@ -166,16 +162,5 @@ impl Model {
         let text = package.text(name)?.ok_or_else(missing)?;
         self.parts.push(name.to_owned());
         part::read(name, &text, self)
-    }
-
-    /// Leaves out items that the slicer is not to print, unless there are no others.
-    fn leave_out_switched_off(&mut self) {
-        let n_off = self.items.iter().filter(|item| !item.is_printed).count();
-        if n_off > 0 && n_off < self.items.len() {
-            self.items.retain(|item| item.is_printed);
-            self.notes.push(format!(
-                "objects that the slicer is not to print: {n_off}; left out"
-            ));
-        }
     }
 }

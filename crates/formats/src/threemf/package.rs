@@ -61,7 +61,18 @@ impl<'a> Package<'a> {
     pub(super) fn root(&mut self) -> Result<String, ReadError> {
         let relations = self.text(RELATIONS)?;
         let target = relations.and_then(|relations| xml::relation_target(&relations, ROOT_KIND));
-        Ok(path(target.as_deref().unwrap_or(USUAL_ROOT)))
+        match target {
+            Some(target) => Ok(path(&target)),
+            None if self.places.contains_key(&key(USUAL_ROOT)) => Ok(USUAL_ROOT.to_owned()),
+            None => Err(ReadError::NoRoot),
+        }
+    }
+
+    /// The name of a part as the archive has it.
+    pub(super) fn shown(&self, name: &str) -> String {
+        let place = self.places.get(&key(name));
+        let shown = place.and_then(|&place| self.archive.name_for_index(place)?.ok());
+        shown.map_or_else(|| name.to_owned(), std::borrow::Cow::into_owned)
     }
 
     /// Lists the parts for which `is_wanted` holds, as keys in order: in lower case, below the common folder.

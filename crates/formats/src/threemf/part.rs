@@ -1,6 +1,6 @@
 //! Reader of one model part of a package, element by element.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use glam::{DAffine3, DVec3};
 use quick_xml::events::BytesStart;
@@ -31,6 +31,7 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
         elements: Elements::of(name, text),
         name,
         number,
+        scale: 1.0,
         first_object: model.objects.len(),
         model,
         ids: BTreeSet::new(),
@@ -40,11 +41,13 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
     while let Some(next) = reader.elements.next()? {
         match next {
             Next::Begin(element) => {
-                has_model |= element.local_name().as_ref() == "model";
+                has_model |= reader.is_model(&element);
                 reader.begin(&element)?;
             }
             Next::Text(text) => reader.take_text(&text),
             Next::End(name) => reader.end(&name),
+            // A shape of others is told, and refused where an object has no other.
+            Next::Foreign(name) => reader.note_foreign(name),
         }
     }
     if has_model {
@@ -59,6 +62,8 @@ struct PartReader<'a, 'm> {
     elements: Elements<'a>,
     name: &'a str,
     number: u32,
+    /// Length of the part's unit, in units of the root.
+    scale: f64,
     model: &'m mut Model,
     /// Index of the model's first object from this part.
     first_object: usize,
@@ -82,6 +87,11 @@ struct Open {
 }
 
 impl PartReader<'_, '_> {
+    /// Whether `element` is the model of the part: the outermost element.
+    fn is_model(&self, element: &BytesStart) -> bool {
+        self.open.path.is_empty() && element.local_name().as_ref() == "model"
+    }
+
     fn begin(&mut self, element: &BytesStart) -> Result<(), ReadError> {
         let name = element.local_name().as_ref().to_owned();
         if GROUPS.contains(&&name[..]) {
@@ -93,7 +103,7 @@ impl PartReader<'_, '_> {
         }
         self.note_shape(&name);
         match &name[..] {
-            "model" => self.read_model(element)?,
+            "model" if self.is_model(element) => self.read_model(element)?,
             "colorgroup" => self.open.color_group = Some((self.id_of(element)?, Vec::new())),
             "color" => {
                 let color = self.elements.string(element, "color")?;
@@ -103,7 +113,10 @@ impl PartReader<'_, '_> {
             }
             "object" => self.open.object = Some(self.read_object(element)?),
             "item" => self.open.item = Some(self.read_item(element)?),
-            "metadata" => self.open.key = Some(self.elements.string(element, "name")?),
+            "metadata" => {
+                let key = self.elements.string(element, "name")?;
+                self.open.key = Some(key).filter(|key| !self.elements.is_foreign(key));
+            }
             "setting" => self.open.key = Some(self.elements.string(element, "key")?),
             _ => self.begin_in_object(&name, element)?,
         }
@@ -138,6 +151,14 @@ impl PartReader<'_, '_> {
             Some(shape) => object.unread = object.unread.or(Some(shape)),
             None if is_child && !OBJECT_CHILDREN.contains(&name) => object.unknown = Some(name.to_owned()),
             None => {}
+        }
+    }
+
+    /// Remembers an element of a namespace that is not read, where it stands in the open object itself.
+    fn note_foreign(&mut self, name: String) {
+        let is_child = self.open.path.last().is_some_and(|parent| parent == "object");
+        if let Some(object) = self.open.object.as_mut().filter(|_| is_child) {
+            object.unknown = Some(name);
         }
     }
 
@@ -177,11 +198,10 @@ impl PartReader<'_, '_> {
     }
 
     fn read_model(&mut self, element: &BytesStart) -> Result<(), ReadError> {
-        let namespaces: BTreeMap<String, String> = self.elements.namespaces(element)?;
+        let namespaces = self.elements.namespaces();
         extension::check_required(&self.elements.string(element, "requiredextensions")?, &namespaces)?;
         let unit = self.elements.string(element, "unit")?;
-        self.model.unit_is_stated = !unit.is_empty();
-        self.model.unit_mm = match unit.as_str() {
+        let unit_mm = match unit.as_str() {
             "micron" => 1e-3,
             "" | "millimeter" => 1.0,
             "centimeter" => 10.0,
@@ -190,6 +210,14 @@ impl PartReader<'_, '_> {
             "meter" => 1000.0,
             _ => return Err(self.elements.error("the unit is none of those that 3MF has")),
         };
+        if self.number == 0 {
+            (self.model.unit_mm, self.model.unit_is_stated) = (unit_mm, !unit.is_empty());
+        } else if unit_mm != self.model.unit_mm {
+            // The unit is an attribute of a part's own `model` and holds for all vertices and measurements in it (core
+            // specification 1.3, section 3.4); no part takes over that of another, and without one it is the millimetre.
+            self.scale = unit_mm / self.model.unit_mm;
+            self.model.converted.insert(self.name.to_owned());
+        }
         Ok(())
     }
 
@@ -249,7 +277,7 @@ impl PartReader<'_, '_> {
             }
             Ok(())
         })?;
-        let point = Vec3::from_array(point);
+        let point = Vec3::from_array(point) * self.scale;
         if point.is_finite() {
             Ok(point)
         } else {
@@ -326,6 +354,8 @@ impl PartReader<'_, '_> {
             }
             Ok(())
         })?;
+        // What it moves is in the root's unit, too: its axes turn and stretch, which has no unit.
+        component.placed.translation *= self.scale;
         Ok(component)
     }
 

@@ -19,7 +19,8 @@ impl Role {
     /// Role of a volume by its type in PrusaSlicer, Bambu Studio, OrcaSlicer and their kin.
     pub(super) fn of_volume(kind: &str) -> Self {
         match kind {
-            "ModelPart" | "normal_part" => Self::Body,
+            // Bambu Studio and its kin read no type as that of a normal part.
+            "" | "ModelPart" | "normal_part" => Self::Body,
             "NegativeVolume" | "negative_part" => Self::Negative,
             "SupportEnforcer" | "SupportBlocker" | "support_enforcer" | "support_blocker" => Self::Support,
             _ => Self::Modifier,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use quick_xml::events::BytesStart;
 
+use super::super::{FilePlate, ReadError};
 use super::package::Package;
 use super::role::{Role, Usage};
 use super::xml::{Elements, Next, number};
@@ -68,16 +69,21 @@ struct Open {
 }
 
 impl Settings {
-    /// Reads all settings in the package. A file that cannot be read adds nothing, since models without it
-    /// are valid, too.
-    pub(super) fn read(package: &mut Package) -> Self {
+    /// What the package holds of them; nothing where there are none, since models come without them as well.
+    ///
+    /// Refuses a file that cannot be read: without the rest of it a part that is cut out would be taken for one of
+    /// the model.
+    pub(super) fn read(package: &mut Package) -> Result<Self, ReadError> {
         let mut settings = Self::default();
         for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {
-            if let Ok(Some(text)) = package.text(&name) {
-                settings.read_file(&name, &text);
-            }
+            let text = package.text(&name)?.unwrap_or_default();
+            let part = package.shown(&name);
+            settings.read_file(&part, &text).map_err(|error| match error {
+                ReadError::Xml { part, at, reason } => ReadError::Settings { part, at, reason },
+                other => other,
+            })?;
         }
-        settings
+        Ok(settings)
     }
 
     pub(super) fn object(&self, id: u32) -> Option<&ObjectSettings> {
@@ -91,46 +97,52 @@ impl Settings {
             .and_then(|&plate| self.plates.get(plate))
     }
 
-    fn read_file(&mut self, name: &str, text: &str) {
+    /// All plates of the project, in the order of the file.
+    pub(super) fn plates(&self) -> &[Plate] {
+        &self.plates
+    }
+
+    fn read_file(&mut self, name: &str, text: &str) -> Result<(), ReadError> {
         let mut elements = Elements::of(name, text);
         let mut open = Open::default();
-        while let Ok(Some(next)) = elements.next() {
+        while let Some(next) = elements.next()? {
             match next {
-                Next::Begin(element) => self.begin(&elements, &element, &mut open),
-                Next::Text(_) => {}
+                Next::Begin(element) => self.begin(&elements, &element, &mut open)?,
+                Next::Text(_) | Next::Foreign(_) => {}
                 Next::End(name) => self.end(&name, &mut open),
             }
         }
+        Ok(())
     }
 
-    fn begin(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) {
-        let attribute = |name| attribute(elements, element, name);
+    fn begin(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) -> Result<(), ReadError> {
+        let attribute = |name| attribute::<u32>(elements, element, name);
         match element.local_name().as_ref() {
             "object" => {
-                open.object = attribute("id");
+                open.object = attribute("id")?;
                 if let Some(id) = open.object {
                     self.objects.entry(id).or_default();
                 }
             }
             // A range of the object's triangles.
             "volume" => {
-                let first = attribute("firstid").unwrap_or(0);
-                let last = attribute("lastid").unwrap_or(u32::MAX);
+                let first = attribute("firstid")?.unwrap_or(0);
+                let last = attribute("lastid")?.unwrap_or(u32::MAX);
                 self.begin_volume(Of::Faces(first, last), Role::Body, open);
             }
             // An object of its own, placed in this one.
             "part" => {
-                let kind: Option<String> = attribute_text(elements, element, "subtype");
-                let role = kind.map_or(Role::Body, |kind| Role::of_volume(&kind));
-                if let Some(id) = attribute("id") {
+                let role = Role::of_volume(&elements.string(element, "subtype")?);
+                if let Some(id) = attribute("id")? {
                     self.begin_volume(Of::Part(id), role, open);
                 }
             }
             "plate" => open.plate = Some(Plate::default()),
             "model_instance" => open.instance = Some((None, 0)),
-            "metadata" => self.note(elements, element, open),
+            "metadata" => self.note(elements, element, open)?,
             _ => {}
         }
+        Ok(())
     }
 
     fn begin_volume(&mut self, of: Of, role: Role, open: &mut Open) {
@@ -160,15 +172,14 @@ impl Settings {
         }
     }
 
-    fn note(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) {
-        let key = attribute_text(elements, element, "key").unwrap_or_default();
-        let value = attribute_text(elements, element, "value").unwrap_or_default();
+    fn note(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) -> Result<(), ReadError> {
+        let (key, value) = key_and_value(elements, element)?;
         if let Some(plate) = &mut open.plate {
             plate.note(&key, &value, &mut open.instance);
-            return;
+            return Ok(());
         }
         let Some(object) = open.object.and_then(|id| self.objects.get_mut(&id)) else {
-            return;
+            return Ok(());
         };
         // 0 stands for the extruder of the object.
         let extruder = || value.parse().ok().filter(|&e: &u32| e > 0);
@@ -183,10 +194,19 @@ impl Settings {
             ("modifier", Some(volume)) if value == "1" => volume.role = Role::Modifier,
             _ => {}
         }
+        Ok(())
     }
 }
 
 impl Plate {
+    /// The plate as those who choose one know it.
+    pub(super) fn of_file(&self) -> FilePlate {
+        FilePlate {
+            number: self.number,
+            name: self.name.clone(),
+        }
+    }
+
     fn note(&mut self, key: &str, value: &str, instance: &mut Option<(Option<u32>, u32)>) {
         match (key, instance) {
             ("plater_id", _) => self.number = value.parse().unwrap_or(0),
@@ -263,17 +283,33 @@ impl Volume {
     }
 }
 
-fn attribute<T: std::str::FromStr>(elements: &Elements, element: &BytesStart, wanted: &str) -> Option<T> {
-    attribute_text(elements, element, wanted).and_then(|value| number(wanted, &value).ok())
+/// The attribute of this name as a number; `None` where it is not there.
+fn attribute<T: std::str::FromStr>(
+    elements: &Elements,
+    element: &BytesStart,
+    wanted: &str,
+) -> Result<Option<T>, ReadError> {
+    let text = elements.string(element, wanted)?;
+    if text.is_empty() {
+        return Ok(None);
+    }
+    number(wanted, &text).map(Some).map_err(|e| elements.error(e))
 }
 
-fn attribute_text(elements: &Elements, element: &BytesStart, wanted: &str) -> Option<String> {
-    let mut found = None;
-    let all = elements.attributes(element, |name, value| {
-        if name == wanted {
-            found = Some(value.to_owned());
+/// Key and value of a `metadata`.
+fn key_and_value(elements: &Elements, element: &BytesStart) -> Result<(String, String), ReadError> {
+    let (mut key, mut value) = (String::new(), String::new());
+    let all = elements.attributes(element, |name, text| {
+        match name {
+            "key" => text.clone_into(&mut key),
+            "value" => text.clone_into(&mut value),
+            _ => {}
         }
         Ok(())
     });
-    all.ok().and(found)
+    // Some writers forget that quotes in a name need a code. A name is no loss, anything else may be a role.
+    if !matches!(key.as_str(), "name" | "plater_name") {
+        all?;
+    }
+    Ok((key, value))
 }

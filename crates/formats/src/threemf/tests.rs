@@ -7,13 +7,16 @@ use super::*;
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 
+mod broken;
+mod foreign;
+mod plates;
 mod roles;
 
 /// Settings files of PrusaSlicer and of Bambu Studio.
 const PRUSA: &str = "Metadata/Slic3r_PE_model.config";
 const BAMBU: &str = "Metadata/model_settings.config";
 const HEAD: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
-<m:model unit="inch" xmlns:m="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="x"><m:resources>"#;
+<m:model unit="inch" xmlns:m="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"><m:resources>"#;
 const TETRAHEDRON: &str = r#"<mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1"
  z="0"/><vertex z="1e0" y="0" x="&#48;"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/><triangle v1="0" v2="1" v3="3"/>
  <triangle v1="1" v2="2" v3="3"></triangle><triangle v1="0" v2="3" v3="2"/></triangles></mesh>"#;
@@ -60,6 +63,51 @@ fn units_components_and_transforms_put_parts_where_they_belong() {
         Some(&[0, 0, 0, 0, 1, 1, 1, 1][..])
     );
     assert_eq!(loaded.file_face, (0..8).collect::<Vec<_>>());
+}
+
+#[test]
+fn each_file_of_a_package_has_the_unit_that_it_states() {
+    let component =
+        |path: &str| format!("<component {path} objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 10 0 0\"/>");
+    let read = |root_unit: &str, unit: &str| {
+        let root = model(
+            &format!(
+                "<object id=\"5\"><components>{}</components></object>",
+                component("p:path=\"/3D/o.model\"").replace("objectid=\"1\"", "objectid=\"2\"")
+            ),
+            r#"<item objectid="5" transform="1 0 0 0 1 0 0 0 1 100 0 0"/>"#,
+        );
+        let inner = tetrahedron(1)
+            + &format!(
+                "<object id=\"2\"><components>{}</components></object>",
+                component("")
+            );
+        let root = root.replacen("unit=\"inch\"", root_unit, 1);
+        let other = model(&inner, "").replacen("unit=\"inch\"", unit, 1);
+        let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), ("3D/o.model", &other)]), None).unwrap();
+        let bounds = loaded.mesh.bounds();
+        let is_told = loaded
+            .notes
+            .iter()
+            .any(|note| note.contains("another unit") && note.contains("3D/o.model"));
+        (loaded.unit_mm, bounds.min.x, bounds.size().x, is_told)
+    };
+    let inch = "unit=\"inch\"";
+    assert_eq!(read(inch, inch), (Some(25.4), 120.0, 1.0, false));
+    assert_eq!(read("unit=\"millimeter\"", ""), (Some(1.0), 120.0, 1.0, false));
+    // The outer transforms are the root's, the inner one and the points are the other file's.
+    let (unit, at, size, is_told) = read("unit=\"millimeter\"", inch);
+    assert!(unit == Some(1.0) && is_told);
+    assert!(
+        (at - (110.0 + 254.0)).abs() < 1e-9 && (size - 25.4).abs() < 1e-9,
+        "{at} {size}"
+    );
+    let (unit, at, size, is_told) = read(inch, "");
+    assert!(unit == Some(25.4) && is_told);
+    assert!(
+        (at - (110.0 + 10.0 / 25.4)).abs() < 1e-9 && (size - 1.0 / 25.4).abs() < 1e-9,
+        "{at} {size}"
+    );
 }
 
 #[test]

@@ -17,6 +17,8 @@ pub struct Cut {
     pub faces: Vec<CutFace>,
     /// True for each cutter that removes anything.
     pub is_met: Vec<bool>,
+    /// For each cutter whether it had holes, which were closed.
+    pub was_open: Vec<bool>,
 }
 
 /// Origin of a triangle after a cut.
@@ -47,12 +49,16 @@ impl CutFace {
 
 /// Reason why a cut cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{reason}")]
-pub struct CutError {
-    /// Cutter at fault; `None` if it is the body.
-    pub cutter: Option<usize>,
-    /// Description of the problem, with a remedy.
-    pub reason: String,
+pub enum CutError {
+    /// The body bounds no volume.
+    #[error("{0}")]
+    Body(InputError),
+    /// A cutter, by its place in the list, bounds no volume.
+    #[error("{1}")]
+    Cutter(usize, InputError),
+    /// The cutters take all of the body away.
+    #[error("nothing is left")]
+    NothingLeft,
 }
 
 /// Cuts `cutters` out of `body`, by exact arithmetic. All of them are first repaired as by [`super::repair`],
@@ -60,34 +66,33 @@ pub struct CutError {
 ///
 /// Fails if a mesh bounds no volume, and if the cut leaves nothing.
 pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
-    let refused = |cutter| {
-        move |error: InputError| CutError {
-            cutter,
-            reason: error.to_string(),
-        }
-    };
-    let volume = volume(body).map_err(refused(None))?;
+    let (volume, _) = volume(body).map_err(CutError::Body)?;
     let mut left = volume.clone();
-    let mut is_met = Vec::new();
+    let (mut is_met, mut was_open) = (Vec::new(), Vec::new());
     for (k, cutter) in cutters.iter().enumerate() {
-        let cutter = self::volume(cutter).map_err(refused(Some(k)))?;
+        let (cutter, had_holes) = self::volume(cutter).map_err(|error| CutError::Cutter(k, error))?;
+        was_open.push(had_holes);
         is_met.push(!volume.intersect(&cutter).is_empty());
         left = left.subtract(&cutter);
     }
     if left.is_empty() {
-        return Err(CutError {
-            cutter: None,
-            reason: "nothing is left of it; make what is cut out smaller".to_owned(),
-        });
+        return Err(CutError::NothingLeft);
     }
     let mesh = left.to_mesh();
     let faces = origins(&mesh, body, cutters);
-    Ok(Cut { mesh, faces, is_met })
+    Ok(Cut {
+        mesh,
+        faces,
+        is_met,
+        was_open,
+    })
 }
 
-fn volume(mesh: &TriMesh) -> Result<Volume, InputError> {
-    let (closed, at) = (closed(mesh)?, mesh.face_center(0));
-    Volume::from_closed_mesh(&closed).map_err(|_| InputError::Crossing { count: 1, at })
+/// What a surface bounds, and whether it had holes, which were closed.
+fn volume(mesh: &TriMesh) -> Result<(Volume, bool), InputError> {
+    let ((closed, had_holes), at) = (closed(mesh)?, mesh.face_center(0));
+    let volume = Volume::from_closed_mesh(&closed).map_err(|_| InputError::Crossing { count: 1, at })?;
+    Ok((volume, had_holes))
 }
 
 /// Origin of each triangle of a cut: the source triangle nearest to its centre.
@@ -150,14 +155,13 @@ mod tests {
         let mut open = cuboid([4.0; 3], [20.0; 3]).to_mesh();
         open.triangles.truncate(6);
         let refused = cut_out(&body, &[&body.clone(), &open]).unwrap_err();
-        assert_eq!(refused.cutter, Some(1));
-        assert!(refused.reason.contains("not closed"), "{refused}");
+        assert!(matches!(refused, CutError::Cutter(1, _)));
+        assert!(refused.to_string().contains("not closed"), "{refused}");
+        let mut less_open = cuboid([4.0; 3], [20.0; 3]).to_mesh();
+        less_open.triangles.truncate(11);
+        let cut = cut_out(&body, &[&less_open, &cuboid([8.0; 3], [11.0; 3]).to_mesh()]).unwrap();
+        assert_eq!(cut.was_open, [true, false]);
         let all = cuboid([-1.0; 3], [11.0; 3]).to_mesh();
-        assert!(
-            cut_out(&body, &[&all])
-                .unwrap_err()
-                .reason
-                .contains("nothing is left")
-        );
+        assert_eq!(cut_out(&body, &[&all]), Err(CutError::NothingLeft));
     }
 }

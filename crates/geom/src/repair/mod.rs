@@ -158,16 +158,20 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
     Ok((draft, repairs, welded.n_collapsed))
 }
 
-/// Makes a closed surface of any number of bodies from a mesh as read, with the repairs of [`repair`].
-pub(crate) fn closed(mesh: &TriMesh) -> Result<TriMesh, InputError> {
+/// A closed surface of any number of bodies, made of a mesh as read and repaired as by [`repair`]; and whether it had
+/// holes, which were closed.
+pub(crate) fn closed(mesh: &TriMesh) -> Result<(TriMesh, bool), InputError> {
     check_points(mesh)?;
-    let mut draft = close_up(mesh)?.0;
+    let (mut draft, repairs, _) = close_up(mesh)?;
+    let had_holes = repairs
+        .iter()
+        .any(|repair| matches!(repair.kind, RepairKind::Closed { .. }));
     check_edges(&draft)?;
     resolve(&mut draft, InsideOut::Ask)?;
     if draft.mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
-    Ok(draft.mesh)
+    Ok((draft.mesh, had_holes))
 }
 
 /// Rejects a draft that is still open or one-sided. Edges with more than two triangles may still bound a

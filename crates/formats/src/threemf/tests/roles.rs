@@ -19,7 +19,7 @@ fn mesh_xml(mesh: &TriMesh) -> String {
     format!("<mesh><vertices>{points}</vertices><triangles>{triangles}</triangles></mesh>")
 }
 
-fn cube(id: u32, attributes: &str) -> String {
+pub(super) fn cube(id: u32, attributes: &str) -> String {
     boxed(id, attributes, "", [0.0; 3], [10.0; 3])
 }
 
@@ -28,13 +28,18 @@ fn bar(id: u32, attributes: &str, more: &str) -> String {
     boxed(id, attributes, more, [8.0, 4.0, 4.0], [20.0, 6.0, 6.0])
 }
 
-fn items(ids: &[u32]) -> String {
+pub(super) fn items(ids: &[u32]) -> String {
     ids.iter()
         .map(|id| format!("<item objectid=\"{id}\"/>"))
         .collect()
 }
 
-fn with_settings(resources: &str, build: &str, name: &str, settings: &str) -> Result<Loaded, ReadError> {
+pub(super) fn with_settings(
+    resources: &str,
+    build: &str,
+    name: &str,
+    settings: &str,
+) -> Result<Loaded, ReadError> {
     let root = model(resources, build);
     read_mesh(&package(&[(USUAL_ROOT, &root), (name, settings)]), None)
 }
@@ -84,6 +89,13 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
     assert!(nothing.to_string().contains("nothing but"), "{nothing}");
 }
 
+/// A block whose second part is the object 2.
+pub(super) fn parts_of(second: &str) -> String {
+    cube(1, "")
+        + second
+        + r#"<object id="3" name="block"><components><component objectid="1"/><component objectid="2"/></components></object>"#
+}
+
 #[test]
 fn negative_volumes_are_cut_out_of_their_own_object_alone() {
     let beside = boxed(4, "", "", [30.0, 0.0, 0.0], [40.0, 10.0, 10.0]);
@@ -126,6 +138,20 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
     );
     let loaded = with_settings(&parts, &items(&[3, 4]), BAMBU, &away).unwrap();
     assert_told(&loaded, "does not meet");
+    // A cutter that lacks a triangle, and one that takes all away.
+    let lacking = parts_of(&bar(2, "", "").replacen("<triangle v1", "<lost v1", 1));
+    let loaded = with_settings(&lacking, &items(&[3]), BAMBU, bambu).unwrap();
+    assert!((volume(&loaded) - 992.0).abs() < 1e-9, "{}", volume(&loaded));
+    assert_told(&loaded, "its surface had holes, which were closed");
+    let all = parts_of(&boxed(2, "", "", [-1.0; 3], [11.0; 3]));
+    let refused = with_settings(&all, &items(&[3]), BAMBU, bambu)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refused.contains("nothing is left of \"block\" after \"hole\" is cut out"),
+        "{refused}"
+    );
+    let loaded = with_settings(&parts, &items(&[3, 4]), BAMBU, &away).unwrap();
     assert_eq!(loaded.mesh.bounds().max.x, 40.0);
 }
 

@@ -1,0 +1,73 @@
+//! Namespaces in scope: which prefixes of a part stand for content of others that is to be passed over.
+
+use std::collections::BTreeMap;
+
+use super::extension;
+
+/// The declarations that are in scope.
+#[derive(Default)]
+pub(super) struct Namespaces {
+    /// For each prefix its declarations, the innermost last; the default namespace has the prefix "".
+    declared: BTreeMap<String, Vec<Declaration>>,
+    /// Prefixes in the order in which they were declared, each with the depth of its element.
+    order: Vec<(usize, String)>,
+    /// The namespace of the part's outermost element, which counts as known: some writers misspell it.
+    own: Option<String>,
+}
+
+struct Declaration {
+    namespace: String,
+    is_foreign: bool,
+}
+
+impl Namespaces {
+    /// Takes in what the element at `depth` declares; the first element of a part names the part's own namespace by
+    /// its `prefix`.
+    pub(super) fn open(&mut self, depth: usize, prefix: &str, declared: BTreeMap<String, String>) {
+        if self.own.is_none() {
+            self.own = Some(declared.get(prefix).cloned().unwrap_or_default());
+        }
+        for (prefix, namespace) in declared {
+            let is_own = self.own.as_ref() == Some(&namespace);
+            let is_foreign = !is_own && extension::is_foreign(&namespace);
+            self.order.push((depth, prefix.clone()));
+            self.declared.entry(prefix).or_default().push(Declaration {
+                namespace,
+                is_foreign,
+            });
+        }
+    }
+
+    /// Forgets what the element at `depth` declared.
+    pub(super) fn close(&mut self, depth: usize) {
+        while let Some((_, prefix)) = self.order.pop_if(|(of, _)| *of >= depth) {
+            if let Some(declarations) = self.declared.get_mut(&prefix) {
+                declarations.pop();
+            }
+        }
+    }
+
+    /// Whether an element, or an attribute with a prefix, of this full name belongs to others. A prefix that is not
+    /// declared belongs to nobody: some writers forget the declaration.
+    pub(super) fn is_foreign(&self, name: &str) -> bool {
+        let prefix = prefix(name);
+        self.declared
+            .get(prefix)
+            .and_then(|declarations| declarations.last())
+            .is_some_and(|declaration| declaration.is_foreign)
+    }
+
+    /// All prefixes in scope with their namespaces.
+    pub(super) fn all(&self) -> BTreeMap<String, String> {
+        let innermost = |(prefix, declarations): (&String, &Vec<Declaration>)| {
+            let last = declarations.last()?;
+            Some((prefix.clone(), last.namespace.clone()))
+        };
+        self.declared.iter().filter_map(innermost).collect()
+    }
+}
+
+/// The prefix of a name; "" where it has none.
+pub(super) fn prefix(name: &str) -> &str {
+    name.rsplit_once(':').map_or("", |(prefix, _)| prefix)
+}
