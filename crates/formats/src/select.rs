@@ -99,10 +99,13 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
         }
     }
     let n_wanted = is_wanted.iter().filter(|wanted| **wanted).count();
-    if n_wanted < n {
+    let is_chosen = *selection != Selection::default();
+    if is_chosen && n > 1 {
         let were = if n_wanted == 1 { "was" } else { "were" };
         let note = format!("{n_wanted} of {n} objects or parts {were} taken");
-        loaded = keep(loaded, &is_wanted);
+        if n_wanted < n {
+            loaded = keep(loaded, &is_wanted);
+        }
         loaded.notes.push(note);
     } else if n > 1 && loaded.format == Format::ThreeMf {
         let names: BTreeSet<&String> = loaded.objects.iter().filter_map(|o| o.name.as_ref()).collect();

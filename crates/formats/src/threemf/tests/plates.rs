@@ -49,6 +49,7 @@ fn instances_that_are_switched_off_count_where_a_plate_names_instances() {
     let bounds = second.mesh.bounds();
     assert_eq!((bounds.min.x, bounds.max.x), (100.0, 210.0));
     assert_told(&second, "not to print: 1; left out");
+    assert_told(&second, "2 of 2 objects or parts were taken");
     let first = choose(&bytes, None, Some("1")).unwrap_err().to_string();
     assert!(
         first.contains("plate 1 holds nothing that the slicer is to print") && first.contains("2 \"Big\""),
