@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Limits: connectors lie on the inner side of the wall, whose edge is estimated from the outer surface
-//! (`interface::sample`); carving may shift it. What else than the two pieces is in a connector's way shows only later.
+//! (`interface::sample`); carving may shift it. Other pieces than the two may obstruct a connector, which
+//! shows only later.
 
 mod blocking;
 mod obstruction;
