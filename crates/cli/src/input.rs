@@ -128,7 +128,7 @@ pub fn repaired(
     })
 }
 
-/// What the file calls its objects and their parts, and where they lie; nothing where there is one alone.
+/// Lists the names of the file's objects and parts with their plates; empty if the file is one unnamed body.
 pub fn objects(loaded: &Loaded) -> Vec<String> {
     let titles = loaded.titles();
     let plates: BTreeSet<u32> = titles.iter().filter_map(|titles| titles.plate).collect();

@@ -105,7 +105,7 @@ fn refusal(error: &CutError, title: &str, cutters: &[Cutter]) -> ReadError {
         },
         CutError::NothingLeft => ReadError::NothingLeft {
             object: title.to_owned(),
-            cutters: listed(cutters.iter().map(|cutter| cutter.name.clone()).collect()),
+            cutters: listed(cutters.iter().map(|cutter| &cutter.name)),
         },
     }
 }

@@ -155,7 +155,7 @@ pub enum ReadError {
     NothingLeft {
         /// The object.
         object: String,
-        /// What is cut out.
+        /// Names of the parts that are cut out.
         cutters: String,
     },
     /// No object, or no plate, of the name asked for.
@@ -184,9 +184,9 @@ pub enum ReadError {
     Settings {
         /// The file within the package.
         part: String,
-        /// Where in it.
+        /// Place in that file.
         at: Place,
-        /// What is wrong.
+        /// Description of the problem.
         reason: String,
     },
     /// A part of a 3MF package that is not what it should be.

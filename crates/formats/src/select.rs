@@ -29,14 +29,14 @@ impl FileObject {
     }
 }
 
-/// What an object is called, and what its parts are called.
+/// Names of an object and its parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Titles {
-    /// Of the object.
+    /// Name of the object, or "object 2".
     pub object: String,
-    /// Names of its parts that differ from it, each once.
+    /// Names of its parts that differ from the object's name, each once.
     pub parts: Vec<String>,
-    /// Number of the plate that it lies on.
+    /// Number of the plate on which the object lies, from 1.
     pub plate: Option<u32>,
 }
 
@@ -47,11 +47,11 @@ impl fmt::Display for Titles {
             return Ok(());
         }
         let parts = self.parts.iter().map(|part| format!("\"{part}\""));
-        write!(f, " with the parts {}", listed(parts.collect()))
+        write!(f, " with the parts {}", listed(parts))
     }
 }
 
-/// What each of some objects and its parts are called, in their order.
+/// Returns the names of objects and their parts, in order.
 fn titles(objects: &[FileObject]) -> Vec<Titles> {
     let mut all: Vec<Titles> = Vec::new();
     let (mut last_item, mut known) = (None, BTreeSet::new());
@@ -112,7 +112,7 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
         let named = if names.is_empty() {
             String::new()
         } else {
-            format!(": {}", listed(names.into_iter().cloned().collect()))
+            format!(": {}", listed(names))
         };
         loaded
             .notes
@@ -121,7 +121,7 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
     Ok(loaded)
 }
 
-/// Which objects lie on the plate of this number; of this name where no plate has the number.
+/// Marks the objects on the plate with this number, or with this name if no plate has the number.
 fn on_plate(loaded: &Loaded, wanted: &str) -> Result<Vec<bool>, ReadError> {
     let folded = wanted.trim().to_lowercase();
     let has_number = |plate: &FilePlate| plate.number.to_string() == folded;
@@ -144,7 +144,7 @@ fn on_plate(loaded: &Loaded, wanted: &str) -> Result<Vec<bool>, ReadError> {
     let has = if names.is_empty() {
         "no plates".to_owned()
     } else {
-        listed(names.into_iter().collect())
+        listed(names)
     };
     if loaded.empty_plates.iter().any(fits) {
         return Err(ReadError::EmptyPlate {
@@ -174,17 +174,18 @@ fn object_names(objects: &[FileObject]) -> String {
     if all.is_empty() {
         return "no objects with names".to_owned();
     }
-    listed(all.into_iter().collect())
+    listed(all)
 }
 
-/// The first of some names, and how many more there are.
-pub(super) fn listed(names: Vec<String>) -> String {
+/// Joins the first names of a list, and tells how many more there are.
+pub(super) fn listed<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String {
     /// Names that a message lists.
     const N_LISTED: usize = 12;
-    let first = names[..names.len().min(N_LISTED)].join(", ");
+    let names: Vec<T> = names.into_iter().collect();
+    let first: Vec<&str> = names.iter().take(N_LISTED).map(AsRef::as_ref).collect();
     match names.len().saturating_sub(N_LISTED) {
-        0 => first,
-        n => format!("{first} and {n} more"),
+        0 => first.join(", "),
+        n => format!("{} and {n} more", first.join(", ")),
     }
 }
 
@@ -230,7 +231,7 @@ fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
 }
 
 impl Loaded {
-    /// What the file's objects and their parts are called, in their order.
+    /// Returns the names of the file's objects and their parts, in order.
     pub fn titles(&self) -> Vec<Titles> {
         titles(&self.objects)
     }

@@ -51,6 +51,16 @@ pub fn voronoi(mesh: TriMesh, n_patches: usize, seed: u64) -> SegmentedSurface {
     label(mesh, n_patches, |p| nearest(&sites, p) as u32)
 }
 
+/// A seam in a horizontal surface through `points`, between pieces 0 and 1.
+pub fn level_seam(points: Vec<Vec3>) -> Seam {
+    Seam {
+        a: PatchId(0),
+        b: PatchId(1),
+        normals: vec![Vec3::Z; points.len()],
+        points,
+    }
+}
+
 /// The seams of `surface` along its triangle edges, chained from corner to corner.
 pub fn seams(surface: &SegmentedSurface) -> Vec<Seam> {
     let mut owner = BTreeMap::new();

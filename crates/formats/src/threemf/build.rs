@@ -7,6 +7,7 @@ use glam::DAffine3;
 use super::super::assembly::{Occurrence, Part, occurrences};
 use super::super::paint::{self, Painted};
 use super::super::polygons::{Numbering, divides};
+use super::super::select::listed;
 use super::super::{Cutter, FileObject, FilePlate, Format, LabelSource, Labelling, Loaded, Place, ReadError};
 use super::model::{Item, Model, Object, Property};
 use super::role::{Role, Usage};
@@ -15,8 +16,6 @@ use shellock_geom::{TriMesh, Vec3};
 
 /// Extruder used by default.
 const FIRST_EXTRUDER: u32 = 1;
-/// Largest number of names listed in a note.
-const N_LISTED: usize = 5;
 
 /// Puts the parts of the build together.
 pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadError> {
@@ -46,7 +45,7 @@ struct Build<'a> {
     settings: &'a Settings,
     /// Where each item of the build lies.
     plates: Vec<Option<FilePlate>>,
-    /// Which items are made.
+    /// True for each item that is read.
     is_made: Vec<bool>,
 }
 
@@ -246,8 +245,8 @@ impl<'a> Body<'a> {
     }
 }
 
-/// Which items are made: those that the slicer is to print, or all where there are none of them. Those that are not
-/// stay in the list, since slicers count them.
+/// Marks the items to read: the printable ones, or all if none is printable. The others stay in the list, because
+/// slicers number instances with them.
 fn is_made(items: &[Item]) -> Vec<bool> {
     let prints = items.iter().any(|item| item.is_printed);
     items.iter().map(|item| item.is_printed || !prints).collect()
@@ -463,7 +462,7 @@ impl Build<'_> {
             .collect()
     }
 
-    /// What the object of an item is called.
+    /// Returns the name of an item's object.
     fn item_name(&self, item: u32) -> Option<String> {
         let component = &self.model.items.get(item as usize)?.component;
         let part = self.find(&component.path, component.id).ok()?;
@@ -505,14 +504,4 @@ fn name_of(usage: Usage, object: &Object) -> String {
     usage
         .name
         .map_or_else(|| format!("object {}", object.id), |name| format!("\"{name}\""))
-}
-
-/// First names of a list, and the number of further ones.
-fn listed(names: &BTreeSet<String>) -> String {
-    let first: Vec<&str> = names.iter().take(N_LISTED).map(String::as_str).collect();
-    let more = match names.len().saturating_sub(N_LISTED) {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
-    format!("{}{more}", first.join(", "))
 }

@@ -53,7 +53,7 @@ pub(super) fn of_shape(element: &str) -> Option<&'static str> {
         .map(|(_, extension)| *extension)
 }
 
-/// Whether content of a namespace is neither read nor known: its names mean what others agreed on.
+/// Returns true if a namespace is neither supported nor known, so that its names must not be interpreted.
 pub(super) fn is_foreign(namespace: &str) -> bool {
     let folded = namespace.to_ascii_lowercase();
     let is_known = KNOWN.iter().any(|known| folded.contains(known));

@@ -18,7 +18,7 @@ const MAX_PARTS: usize = 1000;
 pub(super) struct Model {
     /// Length of the root's unit, in which all lengths are; mm.
     pub(super) unit_mm: f64,
-    /// Whether the root states its unit; else it is the format's default.
+    /// True if the root states its unit. Otherwise the unit is the format's default.
     pub(super) unit_is_stated: bool,
     pub(super) objects: Vec<Object>,
     /// Items of the build.

@@ -1,4 +1,4 @@
-//! Namespaces in scope: which prefixes of a part stand for content of others that is to be passed over.
+//! XML namespaces in scope, which tell the prefixes whose content must be skipped.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +21,8 @@ struct Declaration {
 }
 
 impl Namespaces {
-    /// Takes in what the element at `depth` declares; the first element of a part names the part's own namespace by
-    /// its `prefix`.
+    /// Adds the declarations of the element at `depth`. The first element of a part defines the part's own namespace
+    /// by its `prefix`.
     pub(super) fn open(&mut self, depth: usize, prefix: &str, declared: BTreeMap<String, String>) {
         if self.own.is_none() {
             self.own = Some(declared.get(prefix).cloned().unwrap_or_default());
@@ -38,7 +38,7 @@ impl Namespaces {
         }
     }
 
-    /// Forgets what the element at `depth` declared.
+    /// Removes the declarations of the element at `depth`.
     pub(super) fn close(&mut self, depth: usize) {
         while let Some((_, prefix)) = self.order.pop_if(|(of, _)| *of >= depth) {
             if let Some(declarations) = self.declared.get_mut(&prefix) {
@@ -47,8 +47,8 @@ impl Namespaces {
         }
     }
 
-    /// Whether an element, or an attribute with a prefix, of this full name belongs to others. A prefix that is not
-    /// declared belongs to nobody: some writers forget the declaration.
+    /// Returns true if an element, or a prefixed attribute, of this full name is in a foreign namespace. Undeclared
+    /// prefixes are not foreign, because some writers forget the declaration.
     pub(super) fn is_foreign(&self, name: &str) -> bool {
         let prefix = prefix(name);
         self.declared

@@ -46,7 +46,7 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
             }
             Next::Text(text) => reader.take_text(&text),
             Next::End(name) => reader.end(&name),
-            // A shape of others is told, and refused where an object has no other.
+            // A foreign shape is noted, and is an error if the object has no other.
             Next::Foreign(name) => reader.note_foreign(name),
         }
     }
@@ -87,7 +87,7 @@ struct Open {
 }
 
 impl PartReader<'_, '_> {
-    /// Whether `element` is the model of the part: the outermost element.
+    /// Returns true if `element` is the model of the part, its outermost element.
     fn is_model(&self, element: &BytesStart) -> bool {
         self.open.path.is_empty() && element.local_name().as_ref() == "model"
     }

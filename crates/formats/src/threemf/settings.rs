@@ -69,10 +69,10 @@ struct Open {
 }
 
 impl Settings {
-    /// What the package holds of them; nothing where there are none, since models come without them as well.
+    /// Reads the settings in the package; empty if it has none, as a plain 3MF does.
     ///
-    /// Refuses a file that cannot be read: without the rest of it a part that is cut out would be taken for one of
-    /// the model.
+    /// A settings file that cannot be parsed is an error: the roles after the fault are unknown, so a negative
+    /// volume could be read as a part of the model.
     pub(super) fn read(package: &mut Package) -> Result<Self, ReadError> {
         let mut settings = Self::default();
         for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {

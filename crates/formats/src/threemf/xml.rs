@@ -115,7 +115,7 @@ impl<'a> Elements<'a> {
         Ok(())
     }
 
-    /// Whether a name in the text of an attribute has a prefix of a namespace that is not read.
+    /// Returns true if a name in an attribute's text has the prefix of a namespace that is not read.
     pub(super) fn is_foreign(&self, name: &str) -> bool {
         name.contains(':') && self.namespaces.is_foreign(name)
     }
@@ -128,7 +128,7 @@ impl<'a> Elements<'a> {
     /// Hands each attribute of `element` to `take` by its local name, and refuses two of the same full name.
     /// Declarations of namespaces are no attributes, and those of namespaces that are not read are passed over.
     ///
-    /// Of two with the same local name the one without a prefix counts, unless only extensions have it.
+    /// An attribute without a prefix wins over one with the same local name, unless only extensions define it.
     pub(super) fn attributes(
         &self,
         element: &BytesStart,

@@ -88,7 +88,7 @@ pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
     })
 }
 
-/// What a surface bounds, and whether it had holes, which were closed.
+/// Returns the volume inside a surface, and true if holes had to be closed for it.
 fn volume(mesh: &TriMesh) -> Result<(Volume, bool), InputError> {
     let ((closed, had_holes), at) = (closed(mesh)?, mesh.face_center(0));
     let volume = Volume::from_closed_mesh(&closed).map_err(|_| InputError::Crossing { count: 1, at })?;

@@ -231,7 +231,7 @@ pub fn contacts(
         .collect()
 }
 
-/// What the seams of one pair offer; `None` where they have no length.
+/// Evaluates the seams of one pair; `None` if they have no length.
 fn contact(params: &PlanParams, sizes: &ConnectorSizes, seams: &[(&Seam, Vec<Line>)]) -> Option<Interface> {
     let (a, b) = seams.first().map(|(seam, _)| (seam.a, seam.b))?;
     let size_mm = sizes.of(a, b);
@@ -263,7 +263,7 @@ fn contact(params: &PlanParams, sizes: &ConnectorSizes, seams: &[(&Seam, Vec<Lin
     })
 }
 
-/// What `lines` offer; nothing where there are none.
+/// Evaluates the connectors under `lines` for one order and direction; without lines no connector is possible.
 fn joint(params: &PlanParams, size_mm: f64, lines: &[&Line], way: Way) -> Joint {
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for line in lines {
@@ -298,7 +298,7 @@ fn joint(params: &PlanParams, size_mm: f64, lines: &[&Line], way: Way) -> Joint 
 mod tests {
     use super::*;
     use crate::seam::rules::end_gap_mm;
-    use crate::testing::{label, seams, sphere};
+    use crate::testing::{label, level_seam, seams, sphere};
 
     fn cap_contact(height: f64) -> Interface {
         let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
@@ -368,24 +368,13 @@ mod tests {
         }
     }
 
-    /// What a level seam between two pieces through `points` offers where the first leaves along `s`.
-    fn contact_along(points: Vec<Vec3>, size_mm: f64) -> Interface {
-        let seam = Seam {
-            a: PatchId(0),
-            b: PatchId(1),
-            normals: vec![Vec3::Z; points.len()],
-            points,
-        };
-        let params = PlanParams::default();
-        let lines = lines(&params, size_mm, &seam, None);
-        let sizes = ConnectorSizes::uniform(size_mm);
-        contact(&params, &sizes, &[(&seam, lines)]).unwrap()
-    }
-
     #[test]
     fn an_open_seam_loses_both_ends_and_a_short_one_joins_nothing() {
         let up = |length_mm: f64, size_mm: f64| {
-            let contact = contact_along(vec![Vec3::ZERO, length_mm * Vec3::X], size_mm);
+            let seam = level_seam(vec![Vec3::ZERO, length_mm * Vec3::X]);
+            let params = PlanParams::default();
+            let lines = lines(&params, size_mm, &seam, None);
+            let contact = contact(&params, &ConnectorSizes::uniform(size_mm), &[(&seam, lines)]).unwrap();
             *contact.joint(PatchId(0), LatticeDirection::nearest(Vec3::Z))
         };
         assert!((up(40.0, 2.5).run_mm - 32.5).abs() <= 1.0);

@@ -27,8 +27,8 @@ const BESIDE_SIZES: f64 = 0.5;
 const LOCAL_WALL: f64 = 1.3;
 /// Least cosine between a ray and the surface normal at which the ray leaves through the wall above.
 const LEAVES_ABOVE: f64 = 0.3;
-/// A point is below a wall with this share of its thickness above it, and no such point is near one that was
-/// moved so often from wall to wall.
+/// Share of a wall's thickness at which a point counts as below it, and the number of moves from wall to wall
+/// after which the search for such a point ends.
 const ENOUGH_WALL: f64 = 0.95;
 const MOST_MOVES: usize = 8;
 /// Walls that a ray is followed through, and the step past each, mm.
@@ -65,8 +65,8 @@ impl<'a> Obstructions<'a> {
         })
     }
 
-    /// The point on the inner side of the wall next to `point`, which lies below one wall by its thickness but
-    /// may be nearer to another, as below an edge of the model. `None` where the walls leave no room.
+    /// Moves `point` to the inner side of all walls. It lies below one wall by the wall's thickness, but may be
+    /// nearer to another, as below an edge of the model. `None` if the walls leave no cavity.
     pub fn at_depth(&self, mut point: Vec3) -> Option<Vec3> {
         for _ in 0..MOST_MOVES {
             let limit_mm = ENOUGH_WALL * self.wall_mm;

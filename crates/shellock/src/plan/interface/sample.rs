@@ -30,7 +30,7 @@ pub(super) struct Sample {
     pub length_mm: f64,
     /// Distance to the next sample, mm; 0 at the end of an open line.
     next_mm: f64,
-    /// Whether it is far enough from the ends of an open line.
+    /// True if the place is far enough from the ends of an open line.
     pub has_room: bool,
     pub blocked: Blocked,
 }
@@ -46,13 +46,13 @@ impl Sample {
     }
 }
 
-/// Which piece of a pair is later, and how it leaves.
+/// Order of a pair of pieces, and the direction in which the later one leaves.
 #[derive(Clone, Copy)]
 pub(super) struct Way {
     /// 1 where the piece with the lower id is later, else −1.
     pub side: f64,
     pub s: LatticeDirection,
-    /// Whether it is the key and slides on rails.
+    /// True if the later piece is the key and slides on rails.
     is_on_rails: bool,
 }
 
@@ -66,12 +66,12 @@ impl Way {
         }
     }
 
-    /// Whether there is a rail at `x`. What would obstruct it has been looked at where the key was cut.
+    /// Returns true if a rail is possible at `x`. Obstructions were checked when the key was cut.
     pub fn has_rail(&self, x: &Sample) -> bool {
         self.is_on_rails && x.has_room && x.frame(self.side).carries_rail(self.s.unit())
     }
 
-    /// Whether angles, ends and other walls allow a pin at `x`.
+    /// Returns true if angles, ends and other walls allow a pin at `x`.
     fn has_pin(&self, x: &Sample) -> bool {
         let is_blocked = || x.blocked.has(usize::from(self.side < 0.0), self.s);
         x.has_room && !is_blocked() && x.frame(self.side).carries(self.s.unit())
@@ -121,7 +121,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Whether it is long enough to be made with connectors of `size_mm`.
+    /// Returns true if the connector stage makes the run with connectors of `size_mm`.
     pub fn is_made(&self, size_mm: f64) -> bool {
         self.swept_mm >= self.kind.shortest_sizes() * size_mm
     }
@@ -168,8 +168,8 @@ impl Line {
         runs
     }
 
-    /// What kind of connector is possible at each sample; none beside a change of the male piece or a sharp
-    /// turn, as nothing can be swept over them.
+    /// Returns the kind of connector possible at each sample. None is possible beside a change of the male piece or
+    /// a sharp turn, because no profile can be swept over them.
     fn kinds(&self, way: Way) -> Vec<Option<Kind>> {
         let n = self.samples.len();
         let normals: Vec<Vec3> = self.samples.iter().map(|x| x.normal).collect();
@@ -194,8 +194,8 @@ impl Line {
     }
 }
 
-/// The inner edges of the wall below a seam: none where there is no room behind the wall, several where there
-/// is room in parts.
+/// Estimates the inner edges of the wall below a seam. There are none if the model has no cavity there, and
+/// several if it has one in parts.
 pub(super) fn lines(
     params: &PlanParams,
     size_mm: f64,
@@ -308,7 +308,7 @@ fn line(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::label;
+    use crate::testing::{label, level_seam};
     use shellock_testkit::shapes::brick;
 
     const SIZE_MM: f64 = 2.5;
@@ -316,12 +316,7 @@ mod tests {
     /// The inner edges below a level seam through `points`, and the runs that are made where one piece leaves
     /// upwards.
     fn made_along(points: Vec<Vec3>) -> Vec<Run> {
-        let seam = Seam {
-            a: PatchId(0),
-            b: PatchId(1),
-            normals: vec![Vec3::Z; points.len()],
-            points,
-        };
+        let seam = level_seam(points);
         let params = PlanParams::default();
         let up = Way::new(&params, [seam.a, seam.b], 1.0, LatticeDirection::nearest(Vec3::Z));
         let lines = lines(&params, SIZE_MM, &seam, None);
