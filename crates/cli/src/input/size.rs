@@ -43,7 +43,7 @@ pub(super) fn scale(
     Ok((scale, warning))
 }
 
-/// Whether nobody would ask about a model whose longest side is `longest_mm`.
+/// Returns true if a longest side of `longest_mm` needs no question.
 pub fn is_usual(longest_mm: f64) -> bool {
     USUAL_MM.contains(&longest_mm)
 }
@@ -64,17 +64,22 @@ pub(super) fn check_size(longest_mm: f64) -> Result<(), Failure> {
     if (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&longest_mm) {
         return Ok(());
     }
-    let told = if (0.001..1e6).contains(&longest_mm) {
-        format!("{}", (1000.0 * longest_mm).round() / 1000.0)
-    } else {
-        format!("{longest_mm:.4e}")
-    };
     Err(Failure::Wrong(format!(
-        "the longest side would be {told} mm; it must lie between {least} and {most} mm: choose with --size"
+        "the longest side would be {} mm; it must lie between {least} and {most} mm: choose with --size",
+        rounded(longest_mm)
     )))
 }
 
-/// Whether a program may have scaled a model that has no size of its own to the unit of the format.
+/// A length with at most three decimals, or in powers of ten where that says nothing.
+fn rounded(length: f64) -> String {
+    if (0.001..1e6).contains(&length) {
+        format!("{}", (1000.0 * length).round() / 1000.0)
+    } else {
+        format!("{length:.4e}")
+    }
+}
+
+/// Returns true if a program may have scaled a model that has no size of its own to the unit of the format.
 fn is_normalised(format: Format, longest: f64) -> bool {
     matches!(format, Format::Gltf | Format::Glb) && NORMALISED.iter().any(|range| range.contains(&longest))
 }
@@ -100,14 +105,30 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
             "the longest side is {longest:.3} of the file's units of {mm} mm, as of models that programs scale to one size"
         ),
         Some(mm) => format!(
-            "by the file's unit the longest side is {:.4} mm, which is unusual",
-            mm * longest
+            "by the file's unit the longest side is {} mm, which is unusual",
+            rounded(mm * longest)
         ),
-        None => format!("the file's longest side is {longest:.4} units, which cannot be millimetres"),
+        None => format!(
+            "the file's longest side is {} units, which is unusual for millimetres",
+            rounded(longest)
+        ),
     };
-    let units = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)].map(|(name, mm)| (name, mm * longest));
-    let fitting = units.iter().filter(|(_, size)| USUAL_MM.contains(size));
-    let others: Vec<String> = fitting
+    let units = [
+        ("mm", 1.0),
+        ("cm", 10.0),
+        ("m", 1000.0),
+        ("inch", 25.4),
+        ("micron", 0.001),
+    ];
+    // Millimetres are what most programs mean, so they are offered wherever a kit could be made.
+    let fits = |name: &str, size: f64| {
+        let range = if name == "mm" { MADE_MM } else { USUAL_MM };
+        range.contains(&size)
+    };
+    let others: Vec<String> = units
+        .into_iter()
+        .map(|(name, mm)| (name, mm * longest))
+        .filter(|&(name, size)| fits(name, size))
         .map(|(name, size)| format!("{size:.0} mm with --unit {name}"))
         .collect();
     let others = if others.is_empty() {
@@ -147,6 +168,24 @@ mod tests {
         assert!(told(2000.04).contains("2000.04 mm"), "{}", told(2000.04));
         assert!(told(9.0).contains("be 9 mm"), "{}", told(9.0));
         assert!(told(1e30).contains("1.0000e30 mm"), "{}", told(1e30));
+    }
+
+    #[test]
+    fn a_guess_offers_each_unit_that_fits_and_millimetres_wherever_a_kit_can_be_made() {
+        let read = |text: String| shellock_formats::read_mesh(text.as_bytes(), Some("obj")).unwrap();
+        let loaded = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned());
+        let told = |longest: f64| match guess(&loaded, longest).cause {
+            Cause::Input { sentence, .. } => sentence,
+            other => panic!("{other:?}"),
+        };
+        assert!(told(1500.0).contains("1500 units") && told(1500.0).contains("1500 mm with --unit mm"));
+        assert!(told(15.0).contains("15 mm with --unit mm, 150 mm with --unit cm, 381 mm with --unit inch"));
+        assert!(
+            told(150_000.0).contains("150 mm with --unit micron"),
+            "{}",
+            told(150_000.0)
+        );
+        assert!(!told(1.5).contains("--unit mm"), "{}", told(1.5));
     }
 
     #[test]
