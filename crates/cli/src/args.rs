@@ -1,4 +1,4 @@
-//! What can be said on the command line.
+//! Command-line arguments: commands, options, and the values that they take.
 
 mod blows;
 mod keep_whole;
@@ -28,7 +28,7 @@ use crate::units;
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
 3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
-/// The version, and the commit where a release was built of one (`scripts/release`).
+/// Version of the program, with the commit that a release was built from (`scripts/release`).
 fn version() -> &'static str {
     match option_env!("SHELLOCK_COMMIT") {
         None => env!("CARGO_PKG_VERSION"),
@@ -225,7 +225,7 @@ const EXAMPLES: [(&str, &str); 8] = [
     ),
 ];
 
-/// What dividing alone has no use for.
+/// Options of `build` that dividing alone does not use.
 const NOT_TO_DIVIDE: [&str; 22] = [
     "key",
     "time",
@@ -250,7 +250,7 @@ const NOT_TO_DIVIDE: [&str; 22] = [
     "config",
     "resolution",
 ];
-/// What planning alone has no use for.
+/// Options of `build` that planning alone does not use.
 const NOT_TO_PLAN: [&str; 6] = [
     "key_grip",
     "no_labels",
@@ -260,10 +260,10 @@ const NOT_TO_PLAN: [&str; 6] = [
     "allow_thin",
 ];
 
-/// What is of one model.
+/// Options that belong to one model and make no sense in a batch.
 const NOT_TO_MANY: [&str; 2] = ["labels", "keep_whole"];
 
-/// All commands, each with the options that it has a use for in its help, and examples.
+/// Builds all commands. Each command's help shows only the options that it uses, and examples.
 pub fn command() -> clap::Command {
     let without = |command: clap::Command, unused: &[&str]| {
         unused
@@ -339,7 +339,7 @@ pub struct CouponOptions {
 }
 
 impl CouponOptions {
-    /// The printer that is named: of the user's own, or of those that come with the program.
+    /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
         printer_called(&self.printer, &self.own_printers)
     }
@@ -354,19 +354,19 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its index.
+    /// Index of the axis: 0, 1 or 2.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// The one along a direction, if there is one.
+    /// Returns the axis whose unit vector is `along`, or `None` if there is none.
     pub fn of(along: [f64; 3]) -> Option<Self> {
         [Self::X, Self::Y, Self::Z]
             .into_iter()
             .find(|a| a.unit() == along)
     }
 
-    /// Along it.
+    /// Unit vector along the axis.
     pub fn unit(self) -> [f64; 3] {
         std::array::from_fn(|axis| f64::from(u8::from(axis == self.index())))
     }
@@ -384,7 +384,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Its length, mm.
+    /// Length of one unit, mm.
     pub fn mm(self) -> f64 {
         match self {
             Self::Micron => 1e-3,
@@ -425,7 +425,7 @@ pub enum InsideOutMeans {
 }
 
 impl InsideOutMeans {
-    /// What the library calls it.
+    /// Returns the library's value for this choice.
     pub fn meant(self) -> InsideOut {
         match self {
             Self::Ask => InsideOut::Ask,
@@ -478,14 +478,14 @@ impl FromStr for Thickness {
     }
 }
 
-/// The size of all connectors, a length, or `auto`.
+/// Parses the size of all connectors: a length, or `auto`.
 fn connector_size(text: &str) -> Result<SizeChoice, String> {
     let length = |_| units::length_mm(text).map(SizeChoice::Fixed);
     let size = text.to_ascii_lowercase().parse().or_else(length);
     size.map_err(|_: String| "give millimetres, such as 2.5, or auto".to_owned())
 }
 
-/// The printer of that name: one of the user's `own`, or of those that come with the program.
+/// Finds a printer by name, in any case: one of the user's `own`, or one that comes with the program.
 fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
     let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
     let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
@@ -493,11 +493,11 @@ fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
     found.ok_or_else(|| no_such("printer", name, &names))
 }
 
-/// How numbers are engraved: strokes of two lines, and a wall behind them that the printer makes.
+/// Parameters for engraved numbers: strokes two lines wide, and a wall behind them that the printer can make.
 fn label(min_wall_mm: f64) -> LabelParams {
     let usual = LabelParams::default();
     let two_lines_mm = 2.0 * min_wall_mm;
-    // A wrong wall is told as such, not as a wrong stroke.
+    // A wrong wall is reported as a wrong wall, not as a wrong stroke.
     let within = |usual: f64, most: f64| {
         if two_lines_mm.is_finite() {
             usual.max(two_lines_mm).min(most)

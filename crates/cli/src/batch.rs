@@ -1,4 +1,5 @@
-//! `batch`: kits of a folder of models, each made by a process of its own; what is there already is not made again.
+//! `batch`: makes kits of all models in a folder, each in a process of its own. Existing kits are not made
+//! again.
 
 mod names;
 mod queue;
@@ -27,12 +28,12 @@ use crate::input::sha256;
 use crate::progress::Shown;
 use crate::stages::write;
 
-/// Share of what is free at the beginning that kits may take.
+/// Share of the memory free at the start that all kits together may take.
 const MEMORY_SHARE: f64 = 0.8;
-/// How often a worker looks whether there is room.
+/// Interval at which a worker checks for room.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// `shellock batch`.
+/// Runs `shellock batch` and returns the exit code: 0 if every model has a verified kit, else 1.
 pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     crate::build::checked(&options.options)?;
     if options.options.labels.is_some() {
@@ -74,12 +75,12 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     Ok(u8::from(records.iter().any(|r| r.status != Status::Verified)))
 }
 
-/// The tables, by the names of their files.
+/// Builds the batch's tables, each with the name of its file.
 pub fn tables(records: &[Record]) -> Vec<(String, Vec<u8>)> {
     table::files(records)
 }
 
-/// What tells this program from any other: of two builds of one version, too.
+/// Hash that identifies this program file, so that two builds of one version differ.
 fn program() -> String {
     static OF_FILE: OnceLock<String> = OnceLock::new();
     let hash = || {
@@ -89,13 +90,13 @@ fn program() -> String {
     OF_FILE.get_or_init(hash).clone()
 }
 
-/// What all kits together may take, MB.
+/// Memory limit for all kits together, MB.
 fn memory_mb(options: &BatchOptions) -> f64 {
     let free = || run::available_mb().map_or(f64::INFINITY, |mb| MEMORY_SHARE * mb);
     options.memory.map_or_else(free, |gb| 1e3 * gb)
 }
 
-/// What workers share.
+/// State that the workers share.
 struct Shop<'a> {
     session: &'a Session,
     run: &'a Run,
@@ -140,7 +141,7 @@ impl<'a> Shop<'a> {
         }
     }
 
-    /// The next model, once there is room for it.
+    /// Waits for room for the next model and returns it; `None` if no model is left or the batch stops.
     fn next(&self) -> Option<Task> {
         let mut queue = self.queue.lock().expect("no worker panics");
         loop {

@@ -1,4 +1,4 @@
-//! What a kit bears, in a maker's words.
+//! Loads that a kit can take, in words for the person who makes it.
 
 use shellock::handling::{DROP_MM, Deed, Failure};
 use shellock::metric::{Bears, GivesWay, Holding, LoadBorne, MOST_TIMES, Told};
@@ -6,13 +6,13 @@ use shellock::metric::{Bears, GivesWay, Holding, LoadBorne, MOST_TIMES, Told};
 use crate::place::Standing;
 pub use shellock::metric::BY_SIMULATION;
 
-/// Newtons that a kilogram weighs.
+/// Weight of one kilogram, N.
 const N_PER_KG: f64 = 9.80665;
 
-/// Less than this share of a load is no load: hardly anything holds.
+/// Load factors below this share count as none: almost nothing holds.
 const HARDLY: f64 = 0.05;
 
-/// A force as the weight that presses as much.
+/// Writes a force, N, as the mass in kilograms that weighs as much.
 fn newtons(n: f64) -> String {
     let kg = n / N_PER_KG;
     if kg < 9.95 {
@@ -30,7 +30,7 @@ fn metres(m: f64) -> String {
     }
 }
 
-/// What it bears, one thing each: what is done, and how much of it.
+/// Lists the loads that a kit can take: what is done to it, and the largest figure.
 pub fn figures(bears: &Bears) -> Vec<(&'static str, String)> {
     let mut all = vec![(
         "pressed on its top",
@@ -54,7 +54,7 @@ pub fn figures(bears: &Bears) -> Vec<(&'static str, String)> {
     all
 }
 
-/// The same in a line, and where it gives way first when it is used.
+/// Writes the same figures in one line, and in a second line where the kit fails first in use.
 pub fn lines(holding: &Holding, standing: &Standing) -> Vec<String> {
     let Some(bears) = &holding.summary() else {
         return Vec::new();
@@ -68,7 +68,7 @@ pub fn lines(holding: &Holding, standing: &Standing) -> Vec<String> {
     lines
 }
 
-/// Under which use a kit gives way first, how and where.
+/// Describes the use under which a kit fails first, how it fails and where. `None` if nothing fails.
 pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     let worst = holding.weakest_use()?;
     let first = worst.first?;
@@ -80,7 +80,7 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     ))
 }
 
-/// What happens where a kit gives way.
+/// Describes how a kit fails.
 pub fn gives_way(first: &GivesWay) -> String {
     let [a, b] = first.between;
     match first.how {
@@ -90,7 +90,7 @@ pub fn gives_way(first: &GivesWay) -> String {
     }
 }
 
-/// A load's name in a list, before its figure.
+/// Name of a load in a list, before its figure.
 pub fn told(told: Told) -> &'static str {
     match told {
         Told::Top => "pressed on its top",
@@ -104,12 +104,12 @@ pub fn told(told: Told) -> &'static str {
     }
 }
 
-/// By how many times a load may grow, as far as anybody cares.
+/// Load factor, capped at [`MOST_TIMES`]; larger ones make no difference to anybody.
 pub fn counted(borne: &LoadBorne) -> f64 {
     borne.factor.unwrap_or(MOST_TIMES).min(MOST_TIMES)
 }
 
-/// How much of a load is borne.
+/// Figure of a load: the mass or the height of fall that the kit can take.
 pub fn figure(borne: &LoadBorne) -> String {
     let factor = counted(borne);
     let much = match borne.deed {
@@ -125,7 +125,7 @@ pub fn figure(borne: &LoadBorne) -> String {
     }
 }
 
-/// What is seen where as much of a load acts as is borne.
+/// Sentence that says what happens under the largest load that the kit can take.
 pub fn sentence(as_told: Told, borne: &LoadBorne) -> String {
     let what = told(as_told)
         .trim_end_matches(" from")

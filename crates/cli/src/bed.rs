@@ -1,4 +1,4 @@
-//! Which pieces fit a printer, before they are made, and how many do.
+//! Checks before a kit is made: which pieces will fit the printer, and how many pieces it takes.
 
 use rayon::prelude::*;
 use shellock::design::{DesignError, Params, Settings};
@@ -14,15 +14,15 @@ use crate::failure::Failure;
 use crate::input::Model;
 use crate::printing::described;
 
-/// Numbers of pieces that are tried where some are too large: each so many times the last.
+/// Factor from one number of pieces to the next that is tried where some pieces are too large.
 const MORE_PIECES: f64 = 1.5;
 const MOST_TRIES: u32 = 5;
-/// The fewest pieces that are tried where as few are wanted as fit.
+/// Smallest number of pieces that is tried for `--pieces fits-bed`.
 const FEWEST: usize = 4;
-/// What is tried next there.
+/// Factor from one number of pieces to the next for `--pieces fits-bed`.
 const SOME_MORE: f64 = 1.25;
 
-/// Divides a model to see whether its pieces fit a printer.
+/// Test division of a model that shows whether its pieces fit a printer.
 struct Fitting<'a> {
     session: &'a Session,
     segmentation: &'a SegmentationParams,
@@ -42,7 +42,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// How many pieces there are, and how many of them do not fit.
+    /// Counts the pieces, and those of them that do not fit.
     fn misfits(&self, n_pieces: Option<usize>, labels: Option<&[i64]>) -> Result<(usize, usize), Failure> {
         let silent = |_: shellock::context::Progress<'_>| ();
         let ctx = Ctx::new(&silent, &self.session.stop);
@@ -59,7 +59,7 @@ impl<'a> Fitting<'a> {
         Ok((surface.n_patches, n_misfits))
     }
 
-    /// The fewest pieces, of those tried, that fit; fails where none do.
+    /// Returns the smallest number of pieces, of those tried, at which all fit; fails if there is none.
     fn fewest(&self) -> Result<usize, Failure> {
         let mut n_pieces = FEWEST;
         while self.misfits(Some(n_pieces), None)?.1 > 0 {
@@ -76,10 +76,10 @@ impl<'a> Fitting<'a> {
     }
 }
 
-/// What to say before the work starts where pieces will not fit the printer: how many, and how many pieces would
-/// do.
+/// Returns a warning if some pieces will not fit the printer: how many do not, and how many pieces would do.
 ///
-/// What fits the printer in one piece also does in several; only larger models are divided to see.
+/// A model that fits the printer in one piece also fits in several; only larger models are divided for the
+/// test.
 pub fn too_large(
     session: &Session,
     settings: &Settings,
@@ -114,9 +114,9 @@ pub fn too_large(
     )))
 }
 
-/// `params` with as few pieces as fit the printer, where that is asked for.
+/// Returns `params` with the smallest number of pieces that fits the printer if the options ask for that.
 ///
-/// Fails where the model has labels, which say what the pieces are, or where no number of pieces fits.
+/// Fails if the model has labels, since these already define the pieces, or if no number of pieces fits.
 pub fn fitted(
     session: &Session,
     params: &Params,
@@ -140,7 +140,7 @@ pub fn fitted(
     Ok(params)
 }
 
-/// A patch with a wall behind it, as points: about the piece it becomes.
+/// Points of a patch and of a wall behind it: an estimate of the piece that it becomes.
 pub fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     for face in (0..surface.mesh.triangles.len()).filter(|&f| surface.patch_of_face[f] == patch) {

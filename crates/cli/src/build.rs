@@ -1,4 +1,4 @@
-//! `build` and `demo`: the whole job.
+//! `build` and `demo`: make a whole kit.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -22,7 +22,7 @@ use crate::shape::shape_warnings;
 use crate::stopwatch::StageTime;
 use crate::told::{Finished, print_failures, print_input_warnings, print_warnings};
 
-/// `shellock build`.
+/// Runs `shellock build` and returns the exit code.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
     let params = checked(options)?;
     let stem = file
@@ -36,9 +36,9 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
     make(session, &model, options, &params, &to)
 }
 
-/// `shellock demo`.
+/// Runs `shellock demo` and returns the exit code.
 pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
-    /// Pieces of the squirrel where none are asked for: fewer than usual, which lock sooner.
+    /// Default number of pieces of the squirrel: fewer than usual, which lock sooner.
     const OF_SQUIRREL: usize = 7;
     let mut params = checked(options)?;
     if figure == "squirrel" && options.pieces == Pieces::Auto {
@@ -52,7 +52,7 @@ pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Res
     make(session, &model, options, &params, &to)
 }
 
-/// The parameters, or all that is wrong with them.
+/// Returns the parameters, or all problems with the options in one error.
 pub fn checked(options: &Options) -> Result<Params, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let params = options.params(&printer);
@@ -64,7 +64,7 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
                 .map(|e| e.to_string()),
         );
     }
-    // An infinite time is one: until the proof is closed.
+    // An infinite time is allowed: the search then runs until the proof is closed.
     if options.time.is_nan() || options.time < 0.0 {
         problems.push(format!("time is {} s; it must be 0 or more", options.time));
     }
@@ -87,27 +87,27 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     }
 }
 
-/// A kit that is made, but not written.
+/// A kit that is made but not yet written.
 pub struct Made {
     pub design: Box<Design>,
-    /// What was done with the model and the wishes.
+    /// Notes on changes to the model and to the choices.
     pub notes: Vec<String>,
-    /// Of the kit and its plates.
+    /// Warnings about the kit and its plates.
     pub warnings: Vec<Warning>,
     pub printing: Printing,
-    /// All files of the kit, by their names in its folder.
+    /// All files of the kit, each with its name in the kit's folder.
     pub files: Vec<(String, Vec<u8>)>,
     pub summary: Summary,
 }
 
 impl Made {
-    /// Whether every check passes.
+    /// Returns true if every check passes.
     pub fn passed(&self) -> bool {
         self.design.kit.verification.passed()
     }
 }
 
-/// A job whose wishes are fitted to its model and printer.
+/// A job whose choices have been adapted to its model and printer.
 pub struct Begun<'a> {
     model: &'a Model,
     options: &'a Options,
@@ -117,7 +117,7 @@ pub struct Begun<'a> {
 }
 
 impl<'a> Begun<'a> {
-    /// What is to be made of `model`; refuses what cannot be.
+    /// Prepares a job for `model`; fails if it cannot be made.
     pub fn new(
         session: &Session,
         model: &'a Model,
@@ -138,7 +138,7 @@ impl<'a> Begun<'a> {
         })
     }
 
-    /// Makes it; what goes on is told to `show`.
+    /// Makes the kit and reports progress to `show`.
     pub fn made(self, session: &Session, show: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Made, Failure> {
         let (model, options) = (self.model, self.options);
         let clock = PlanClock::new(options.plan_time);
@@ -233,7 +233,7 @@ fn make(
     to.write(&made.files)?;
     let code = u8::from(!made.passed());
     let standing = Standing::of(options.up, model.solid.mesh());
-    // Those of the model stand on the first lines already.
+    // The model's own warnings were printed with the first lines.
     let mut warnings = made.warnings.clone();
     warnings.retain(|w| !model.warnings.contains(w));
     if session.is_json {

@@ -1,4 +1,4 @@
-//! The options of `build` as the studio's page shows them, from their one declaration.
+//! Options of `build` as the studio's page shows them, taken from their one declaration.
 
 use clap::{Arg, ArgAction, Parser};
 use serde_json::{Map, Value, json};
@@ -10,7 +10,7 @@ use crate::args::{self, Cli, Command, Options};
 use crate::build::checked;
 use crate::project::Choice;
 
-/// What the studio sees to itself.
+/// Options that the studio handles itself.
 const ITS_OWN: [&str; 12] = [
     "config",
     "labels",
@@ -26,13 +26,13 @@ const ITS_OWN: [&str; 12] = [
     "version",
 ];
 
-/// Options whose values may be labels of faces.
+/// Options whose values may be face labels.
 const OF_LABELS: [&str; 2] = ["key", "keep-whole"];
 
 /// Chosen options by their long names, in the order of their declaration.
 pub type Choices = Vec<(String, Choice)>;
 
-/// The options that a person chooses.
+/// Options that a person can choose in the studio.
 fn offered() -> Vec<Arg> {
     let mut all = args::command();
     let build = all.find_subcommand_mut("build").expect("there is such a command");
@@ -40,7 +40,7 @@ fn offered() -> Vec<Arg> {
     build.get_arguments().filter(is_offered).cloned().collect()
 }
 
-/// All options with what is chosen.
+/// Lists all options as JSON, each with its chosen value.
 pub fn told(choices: &Choices, own_printers: &[Printer]) -> Value {
     let entry = |arg: &Arg| {
         let name = arg.get_long().expect("only such are offered");
@@ -84,7 +84,7 @@ fn kind(arg: &Arg, own_printers: &[Printer]) -> &'static str {
     }
 }
 
-/// The values that an option can have, where they are few.
+/// Possible values of an option where it has a fixed list; else empty.
 fn known_values(arg: &Arg, own_printers: &[Printer]) -> Vec<String> {
     match arg.get_long() {
         Some("printer") => own_printers
@@ -103,8 +103,8 @@ fn known_values(arg: &Arg, own_printers: &[Printer]) -> Vec<String> {
     }
 }
 
-/// `choices` with `changes`, each a value or `null` for none; refuses names that are no options and values of
-/// the wrong kind.
+/// Applies `changes` to `choices`. Each change is a value, or `null` to clear the choice. Refuses unknown
+/// names and values of the wrong kind.
 pub fn changed(choices: &Choices, changes: &Map<String, Value>) -> Result<Choices, Refusal> {
     let offered = offered();
     let mut next = choices.clone();
@@ -119,8 +119,8 @@ pub fn changed(choices: &Choices, changes: &Map<String, Value>) -> Result<Choice
     Ok(next)
 }
 
-/// `choices` for faces with other labels: each label that they name is replaced by its new one. A label without a new one
-/// stays, and so does all that is no label, such as a place.
+/// Replaces the labels in `choices` after a relabelling of the faces. Labels without a new one stay, and so
+/// does every value that is not a label, such as a place.
 pub fn relabelled(choices: &Choices, new_label: impl Fn(i64) -> Option<i64>) -> Choices {
     let relabel = |text: &String| {
         let label = text.trim().parse().ok();
@@ -173,7 +173,7 @@ fn choice(arg: &Arg, value: &Value) -> Result<Option<Choice>, Refusal> {
     })
 }
 
-/// What the choices mean; refuses what `build` would refuse, in its words.
+/// Parses the choices as options; refuses what `build` would refuse, in the same words.
 pub fn options(choices: &Choices, own_printers: &[Printer]) -> Result<Options, Refusal> {
     let mut words = vec!["shellock".to_owned(), "build".to_owned(), "model".to_owned()];
     for (name, choice) in choices {
@@ -192,7 +192,7 @@ pub fn options(choices: &Choices, own_printers: &[Printer]) -> Result<Options, R
     Ok(options)
 }
 
-/// What is wrong with arguments, without how to call the program.
+/// Error message of wrong arguments, without the usage text.
 fn words_of(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let first = text.trim_start_matches("error: ").split("\n\n").next();
@@ -230,7 +230,7 @@ mod tests {
         ] {
             assert_eq!(names.iter().filter(|n| **n == name).count(), 1, "{name}");
         }
-        // Files are the studio's own, and it runs the program as it needs it.
+        // The studio handles files itself and runs the program as it needs.
         for own in ITS_OWN {
             assert!(!names.contains(&own), "{own}");
         }

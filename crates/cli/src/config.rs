@@ -1,4 +1,4 @@
-//! The configuration file: options by the names they have on the command line, and printers of one's own.
+//! Configuration file: options by their names on the command line, and the user's own printers.
 //!
 //! ```toml
 //! printer = "workshop"
@@ -11,8 +11,8 @@
 //! clearance = 0.18
 //! ```
 //!
-//! Options become arguments in front of the user's own, so there is one place that knows them and says what
-//! is wrong with them. What is said on the command line goes before.
+//! Options become arguments in front of the user's own, so only one place knows them and reports what is
+//! wrong with them. Arguments on the command line take precedence.
 
 use std::ffi::OsString;
 use std::fs;
@@ -27,22 +27,22 @@ use crate::args::{self, Cli, Options};
 use crate::project::{self, ModelOf};
 use crate::stress;
 
-/// The file that is read without being named.
+/// Name of the file that is read without being named.
 pub const USUAL: &str = "shellock.toml";
-/// A larger file is no configuration, bytes.
+/// Size limit of a configuration file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Why there is no command.
+/// Reason why the arguments give no command.
 pub enum Refusal {
-    /// Something is wrong with the arguments, or only help was asked for.
+    /// Something is wrong with the arguments, or they only request help.
     Arguments(clap::Error),
     /// Something is wrong with the file.
     File(String),
 }
 
-/// The command that these arguments and the configuration file ask for.
+/// Parses the command from these arguments and the configuration file.
 ///
-/// A project file stands for its model, and for the configuration file where none is named.
+/// A project file takes the place of its model, and of the configuration file unless one is named.
 pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     let matches = args::command()
         .try_get_matches_from(&arguments)
@@ -55,7 +55,7 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     let Some(path) = project.clone().or_else(|| file_of(given)) else {
         return Ok(cli);
     };
-    // What is saved there may be the first of it.
+    // The printer to be saved may be the first content of the file.
     let saves = given
         .try_get_one::<String>("save")
         .is_ok_and(|name| name.is_some());
@@ -94,7 +94,7 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     Ok(cli)
 }
 
-/// Of the arguments of `batch` those that are options of `build`, as they were given.
+/// Returns those of the given arguments of `batch` that are options of `build`.
 pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
     let all = args::command();
     let Ok(matches) = all.clone().try_get_matches_from(arguments) else {
@@ -135,7 +135,7 @@ pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
     options
 }
 
-/// The project file that is given instead of a model; fails where a configuration file is named, too.
+/// Returns the project file that is given instead of a model; fails if a configuration file is named, too.
 fn project_of(given: &ArgMatches) -> Result<Option<PathBuf>, Refusal> {
     let model = given.try_get_one::<PathBuf>("model").ok().flatten();
     let is_configured = given
@@ -150,7 +150,7 @@ fn project_of(given: &ArgMatches) -> Result<Option<PathBuf>, Refusal> {
     }
 }
 
-/// Files that a project's options name lie beside it.
+/// Resolves the files that a project's options name, relative to the project's folder.
 fn lay_beside(options: &mut toml::Table, folder: &Path) -> Result<(), String> {
     if let Some(toml::Value::String(labels)) = options.get_mut("labels") {
         *labels = project::beside(folder, labels)?.to_string_lossy().into_owned();
@@ -158,7 +158,7 @@ fn lay_beside(options: &mut toml::Table, folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// The model of a command, and how it is made.
+/// Returns the command's model path and options, if it has both.
 fn model_of(command: &mut args::Command) -> Option<(&mut PathBuf, &mut Options)> {
     use args::Command::{Build, Inspect, Plan, Segment};
     match command {
@@ -170,7 +170,8 @@ fn model_of(command: &mut args::Command) -> Option<(&mut PathBuf, &mut Options)>
     }
 }
 
-/// The file that was named, or the usual one where it exists; `None` for commands that take none.
+/// Returns the named configuration file, or else the usual one if it exists. `None` for commands that take
+/// none.
 fn file_of(given: &ArgMatches) -> Option<PathBuf> {
     let named = given.try_get_one::<PathBuf>("config").ok()?;
     named
@@ -192,15 +193,15 @@ fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
     }
 }
 
-/// What a configuration file holds.
+/// Contents of a configuration file.
 struct Config {
     options: toml::Table,
     printers: Vec<Printer>,
-    /// Of a project.
+    /// Model of a project file; `None` in a plain configuration.
     model: Option<ModelOf>,
 }
 
-/// A printer as the file has it.
+/// One printer as the file declares it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Own {
@@ -224,19 +225,19 @@ fn read(path: &Path) -> Result<Config, String> {
     parse(&fs::read_to_string(path).map_err(|e| e.to_string())?)
 }
 
-/// `[printers]` of the usual file as it stands there; nothing where there is no such file, or one that cannot be read.
+/// Returns `[printers]` of the usual file, unchanged. `None` if there is no such file or it cannot be read.
 pub fn usual_printers() -> Option<toml_edit::Item> {
     let text = fs::read_to_string(USUAL).ok()?;
     let file: toml_edit::DocumentMut = text.parse().ok()?;
     file.get("printers").cloned()
 }
 
-/// The model that a project file names.
+/// Returns the model that a project file names.
 pub fn project_model(text: &str) -> Result<Option<ModelOf>, String> {
     Ok(parse(text)?.model)
 }
 
-/// The printers of a configuration.
+/// Returns the printers of a configuration.
 pub fn printers_of(text: &str) -> Result<Vec<Printer>, String> {
     Ok(parse(text)?.printers)
 }
@@ -305,14 +306,14 @@ fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
     }
 }
 
-/// The options of the file as arguments of the subcommand `name`, but for those that were `given`.
+/// Turns the file's options into arguments of the subcommand `name`, except those that were `given`.
 fn extra_arguments(
     cli: &Command,
     name: &str,
     given: &ArgMatches,
     options: &toml::Table,
 ) -> Result<Vec<String>, String> {
-    /// One of them stands for all.
+    /// Options for size: giving one overrides all three.
     const SIZES: [&str; 3] = ["size", "height", "scale"];
     let command = cli
         .find_subcommand(name)

@@ -1,4 +1,4 @@
-//! `coupon`: the fit test of a printer, and what came of it.
+//! `coupon`: makes the fit test of a printer, and saves its result.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,12 +19,12 @@ use crate::config::{self, printers_of};
 use crate::failure::Failure;
 use crate::stages::write;
 
-/// The plate's name where none is given, and within a folder; the mesh has the same with another ending.
+/// Default name of the plate's file, also within a folder; the mesh has the same name with another ending.
 const PLATE: &str = "shellock-coupon.3mf";
-/// Room between what is printed and the edge of the bed, mm, as on the plates of kits.
+/// Margin between the printed parts and the edge of the bed, mm, as on the plates of kits.
 const EDGE_MM: f64 = 4.0;
 
-/// `shellock coupon`.
+/// Runs `shellock coupon` and returns the exit code.
 pub fn coupon(session: &Session, options: &CouponOptions) -> Result<u8, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let fits = coupon::fits(
@@ -50,7 +50,7 @@ pub fn coupon(session: &Session, options: &CouponOptions) -> Result<u8, Failure>
     Ok(0)
 }
 
-/// Where the plate and its mesh go; refuses what is there already, unless it may be replaced.
+/// Returns the paths of the plate and of its mesh; refuses existing files unless `force` is set.
 fn destination(out: Option<&Path>, force: bool) -> Result<[PathBuf; 2], Failure> {
     let out = out.unwrap_or(Path::new(PLATE));
     let refuse = |path: &Path, why: &str| Err(Failure::Wrong(format!("{} {why}", path.display())));
@@ -80,7 +80,7 @@ fn destination(out: Option<&Path>, force: bool) -> Result<[PathBuf; 2], Failure>
     Ok(files)
 }
 
-/// A coupon in the middle of a printer's bed.
+/// Parts of a fit test, centred on a printer's bed.
 struct Plate<'a> {
     printer: &'a Printer,
     fits: &'a [Fit],
@@ -117,7 +117,7 @@ impl<'a> Plate<'a> {
         })
     }
 
-    /// All parts, each an object with its name and the colour of its number.
+    /// Writes all parts as 3MF objects, each with its name and the colour of its number.
     fn archive(&self) -> Vec<u8> {
         let names: Vec<String> = self.parts.iter().map(object_name).collect();
         let objects: Vec<NamedObject<'_>> = self
@@ -135,7 +135,7 @@ impl<'a> Plate<'a> {
         write_3mf(&objects)
     }
 
-    /// All parts in one mesh.
+    /// Joins all parts in one mesh.
     fn whole(&self) -> TriMesh {
         let mut whole = TriMesh::default();
         for part in self.parts.iter().map(Part::on_plate) {
@@ -148,11 +148,11 @@ impl<'a> Plate<'a> {
         whole
     }
 
-    /// How long the printer takes for it, about, s.
+    /// Estimate of the print time, s.
     fn seconds(&self) -> f64 {
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         let load = |part: &Part| Load {
-            // It is laid so that it needs none.
+            // The parts are laid so that they need no support.
             support_mm3: 0.0,
             wide_support_mm3: 0.0,
             ..Load::of(&part.on_plate(), axes, self.printer)
@@ -174,7 +174,7 @@ impl<'a> Plate<'a> {
             return;
         }
         let [width, depth, height] = self.size_mm;
-        // docs/guide/fit-test.md has what a slicer says.
+        // docs/guide/fit-test.md quotes the figure of a slicer.
         let time = format!("about {:.0} min", self.seconds() / 60.0);
         println!(
             "{}: {} parts, {width:.0} × {depth:.0} × {height:.1} mm; {time} on the printer \"{name}\"",
@@ -197,7 +197,7 @@ impl<'a> Plate<'a> {
     }
 }
 
-/// As a slicer lists it: "3 pin, 0.12 mm".
+/// Name of a part in a slicer's list, such as "3 pin, 0.12 mm".
 fn object_name(part: &Part) -> String {
     let clearance_mm = match part.kind {
         Kind::Channel | Kind::Pin => part.fit.clearance_mm,
@@ -206,7 +206,7 @@ fn object_name(part: &Part) -> String {
     format!("{}, {clearance_mm} mm", part.name())
 }
 
-/// As a shell takes it.
+/// Quotes a name for a shell where it needs quotes.
 fn quoted(name: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
     if name.chars().all(is_plain) {
@@ -237,8 +237,8 @@ fn tell_saved(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &
     }
 }
 
-/// Writes the clearances of `fit`, which is one of `base`, into the configuration file as those of the
-/// printer `name`; all else stays as it is.
+/// Writes the clearances of `fit` into the configuration file as those of the printer `name`. `fit` is a
+/// result for `base`. All else in the file stays.
 fn save(path: &Path, base: &Printer, fit: &Fit, name: &str) -> Result<(), Failure> {
     let wrong = |problem: String| Failure::Wrong(format!("{}: {problem}", path.display()));
     let is_called = |p: &Printer| p.name.eq_ignore_ascii_case(name);
@@ -252,7 +252,7 @@ fn save(path: &Path, base: &Printer, fit: &Fit, name: &str) -> Result<(), Failur
             "give the printer a name with --save, such as workshop".into(),
         ));
     }
-    // A link stays one; the file that it leads to changes.
+    // A symbolic link is kept; the file that it points to is changed.
     let file = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let unreadable = |source| Failure::Unreadable {
         path: path.to_owned(),
@@ -275,8 +275,8 @@ fn save(path: &Path, base: &Printer, fit: &Fit, name: &str) -> Result<(), Failur
     write(&file, saved.as_bytes())
 }
 
-/// The configuration `text` with the clearances of `fit`, which is one of `base`, as those of the printer
-/// `name`.
+/// Returns the configuration `text` with the clearances of `fit`, a result for `base`, as those of the
+/// printer `name`.
 fn with_printer(text: &str, base: &Printer, fit: &Fit, name: &str) -> Result<String, String> {
     let mut configuration: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let mut empty = Table::new();
@@ -311,7 +311,7 @@ fn with_printer(text: &str, base: &Printer, fit: &Fit, name: &str) -> Result<Str
     }
 }
 
-/// The key of the printer `name` among `printers`, which is made from `base` where there is none.
+/// Returns the key of the printer `name` among `printers`; adds a printer based on `base` if there is none.
 fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<String, String> {
     let named = |name: &str| {
         let mut entries = printers.iter();
@@ -333,7 +333,7 @@ fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<Str
         ));
     }
     let made = match named(&base.name) {
-        // A copy stands at the end, without what was noted beside the other.
+        // A copy goes to the end, without the comments beside the original.
         Some((_, Item::Table(mut own))) => {
             own.set_position(None);
             own.decor_mut().clear();
@@ -350,8 +350,8 @@ fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<Str
     Ok(name.to_owned())
 }
 
-/// Which of the program's printers a printer of the configuration is like: processes are called as the first
-/// of their printers.
+/// Name of the preset that a printer of the configuration is based on. A process has the same name as the
+/// first of its printers.
 fn likeness(printer: &Item) -> String {
     let word = |key: &str| printer.get(key).and_then(Item::as_str);
     word("like")
@@ -360,7 +360,7 @@ fn likeness(printer: &Item) -> String {
         .to_owned()
 }
 
-/// Sets a number; a comment beside it stays.
+/// Sets a number and keeps a comment beside it.
 fn set(table: &mut dyn TableLike, key: &str, number: f64) {
     let new = toml_edit::Value::from(number);
     match table.get_mut(key).and_then(Item::as_value_mut) {

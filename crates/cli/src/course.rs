@@ -1,8 +1,8 @@
-//! Where in the making of a kit a stage stands, and how long the rest takes.
+//! Progress of a kit: the number of the current stage, and an estimate of the time left.
 
 use std::time::{Duration, Instant};
 
-/// The stages of a kit in order, with the share of its time that each takes: means of 14 models of 150 to 200 mm.
+/// Stages of a kit in order, each with its share of the total time: means of 14 models of 150 to 200 mm.
 const STAGES: [(&str, f64); 19] = [
     ("thickness", 0.06),
     ("segmentation", 0.06),
@@ -24,34 +24,34 @@ const STAGES: [(&str, f64); 19] = [
     ("gaps", 0.08),
     ("files and pictures", 0.12),
 ];
-/// Nothing is said of the time left before so much of a kit is done, as a share.
+/// Share of a kit that must be done before the time left is estimated.
 const LEAST_SHARE: f64 = 0.1;
 
-/// A stage's place among all.
+/// Position of a stage among all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
-    /// From 1.
+    /// Number of the stage, from 1.
     pub number: usize,
     pub of: usize,
-    /// Until the kit is done if it passes, as far as can be told.
+    /// Estimated time until the kit is done, if it passes; `None` while too little is done.
     pub left: Option<Duration>,
 }
 
-/// The course of a job: kits that fail begin again in the middle.
+/// Progress of a job. A kit that fails begins again at an earlier stage.
 #[derive(Debug)]
 pub struct Course {
-    /// When and where this kit began.
+    /// Start time and first stage of the current kit.
     begun: Option<(Instant, usize)>,
     at: usize,
 }
 
 impl Course {
-    /// Nothing has begun.
+    /// Creates the course of a job that has not begun.
     pub fn new() -> Self {
         Self { begun: None, at: 0 }
     }
 
-    /// The stage `name` begins; `None` where it is none of a kit's.
+    /// Records that the stage `name` begins; `None` if it is not a stage of a kit.
     pub fn begin(&mut self, name: &str, now: Instant) -> Option<Stand> {
         let index = STAGES.iter().position(|(n, _)| *n == name)?;
         let (since, first) = match self.begun {
@@ -72,12 +72,12 @@ impl Course {
 }
 
 impl Stand {
-    /// "stage 5 of 19: gaps".
+    /// Writes the position as in "stage 5 of 19: gaps".
     pub fn words(&self, name: &str) -> String {
         format!("stage {} of {}: {name}", self.number, self.of)
     }
 
-    /// The same with the time left, which is another each time.
+    /// Writes the position and the time left, which changes each time.
     pub fn timed_words(&self, name: &str) -> String {
         const STEP_S: f64 = 5.0;
         let left = self.left.map_or_else(String::new, |left| {
@@ -101,7 +101,7 @@ mod tests {
         let key = course.begin("key", after(12.0)).unwrap();
         let left = key.left.unwrap().as_secs_f64();
         assert!((left - 12.0 / 0.12 * 0.88).abs() < 1.0, "{left}");
-        // The kit fails: what is made again has no time yet.
+        // The kit fails: the next one has no estimate yet.
         course.begin("verify", after(50.0)).unwrap();
         assert_eq!(course.begin("segmentation", after(60.0)).unwrap().left, None);
         assert_eq!(course.begin("a plan of half the score", after(61.0)), None);

@@ -1,4 +1,4 @@
-//! A division into pieces in figures: what `inspect --segment` says of it.
+//! Figures of a division into pieces, as `inspect --segment` prints them.
 
 use shellock::design::{DesignError, Settings};
 use shellock::segmentation::figures::{
@@ -17,17 +17,17 @@ use crate::input::Model;
 use crate::place::Standing;
 use crate::progress::Display;
 
-/// A division, and what is told of it.
+/// A division with its figures and warnings.
 pub struct Division {
-    /// What there is to say.
+    /// Figures of the division.
     pub figures: DivisionFigures,
-    /// What was changed, and what may fail.
+    /// Changes that were made, and risks.
     pub warnings: Vec<Warning>,
-    /// What it was divided for.
+    /// Parameters that the surface was divided with.
     params: SegmentationParams,
 }
 
-/// Divides `model` as `segment` does, by its labels where it has any.
+/// Divides `model` as `segment` does, by its labels if it has any.
 pub fn divide(session: &Session, model: &Model, options: &Options) -> Result<Division, Failure> {
     let params = fitted(session, &checked(options)?, options, model)?;
     let params = Settings::resolve(&params).segmentation;
@@ -53,7 +53,7 @@ pub fn divide(session: &Session, model: &Model, options: &Options) -> Result<Div
 }
 
 impl Division {
-    /// All of it for people, a line each: of the whole, then of each piece.
+    /// Lines for people: figures of the whole, then one line for each piece.
     pub fn lines(&self, standing: &Standing) -> Vec<String> {
         let of_whole = self.of_whole();
         let width = of_whole.iter().map(|(what, _)| what.chars().count()).max();
@@ -70,7 +70,7 @@ impl Division {
         lines
     }
 
-    /// What is told of the whole, each with its name.
+    /// Figures of the whole division, each with its name.
     fn of_whole(&self) -> Vec<Line> {
         let DivisionFigures {
             area_mm2,
@@ -109,7 +109,7 @@ impl Division {
     }
 }
 
-/// A name and what is told of it.
+/// A name and the text of its figure.
 type Line = (&'static str, String);
 
 fn of_seams(seams: &SeamFigures) -> Vec<Line> {

@@ -1,7 +1,8 @@
-//! The jobs of the command line for programs that embed them: meshes and options in, kits out; no file, no standard output.
+//! Jobs of the command line for programs that embed them: meshes and options in, kits out. They use no
+//! standard output, and no files but those that the caller names.
 //!
-//! Options have the names and words that they have on the command line, and mean the same: a kit has the bytes that
-//! `shellock build` would write of a PLY file with the same points, triangles and labels.
+//! Options have the names and values that they have on the command line, with the same meaning. A kit has the
+//! bytes that `shellock build` would write for a PLY file with the same points, triangles and labels.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -27,20 +28,20 @@ use crate::output::{Destination, is_of_kits};
 use crate::stages;
 use crate::{batch, own_assembly};
 
-/// Why there is no result.
+/// Reason why there is no result.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{message}")]
 pub struct Problem {
-    /// The exit code of the command line: 2 for what was given, 3 for no plan, 4 for what could not be written, 130 for stopped.
+    /// Exit code of the command line: 2 wrong input, 3 no plan, 4 a file could not be written, 130 stopped.
     pub code: u8,
-    /// For people.
+    /// Error message for people.
     pub message: String,
-    /// Where, in the model's units.
+    /// Place of the problem, in the model's units.
     pub at: Option<[f64; 3]>,
 }
 
 impl Problem {
-    /// Something that was given is wrong.
+    /// Problem with something that was given (code 2).
     pub fn wrong(message: String) -> Self {
         Self {
             code: 2,
@@ -70,61 +71,62 @@ impl std::convert::From<shellock_studio::Refusal> for Problem {
     }
 }
 
-/// What goes on.
+/// Progress of a job.
 pub enum News<'a> {
-    /// A stage begins: the `number`-th of `n`, where they are counted.
+    /// A stage begins: the `number`-th of `n`, if stages are counted.
     Stage {
-        /// Its name.
+        /// Name of the stage.
         name: &'a str,
-        /// From 1; 0 where stages are not counted.
+        /// Number of the stage, from 1; 0 if stages are not counted.
         number: usize,
-        /// How many there are.
+        /// Number of stages in all.
         n: usize,
     },
-    /// Something was decided.
+    /// A decision was made, in words.
     Note(&'a str),
 }
 
-/// Where a model comes from.
+/// Source of a model.
 pub enum Source<'a> {
     /// Points and triangles in file units, as of a PLY file, and one label a triangle where pieces are given.
     Mesh(&'a TriMesh, Option<&'a [i32]>),
-    /// The bytes of a file of any format that is read.
+    /// Bytes of a file in any format that can be read.
     File(&'a [u8]),
 }
 
-/// A closed surface and what is wanted of it.
+/// A model and the options for its kit.
 pub struct Request<'a> {
-    /// The surface.
+    /// Source of the closed surface.
     pub model: Source<'a>,
-    /// The name of the model's file.
+    /// Name of the model's file.
     pub name: &'a str,
-    /// Options by their long names on the command line: a text or a number each, `true` for a flag, a list where one may be given several times.
+    /// Options by their long names on the command line. Values are a text or a number each, `true` for a
+    /// flag, and a list for options that may be given several times.
     pub options: &'a Map<String, Value>,
 }
 
-/// A kit, made but not written.
+/// A kit that is made but not yet written.
 pub struct Kit {
-    /// All files of its folder, by their names there.
+    /// All files of the kit, each with its name in the kit's folder.
     pub files: Vec<(String, Vec<u8>)>,
-    /// The pieces in the order in which they go in, in place, mm.
+    /// Pieces in order of installation, in assembled position, mm.
     pub pieces: Vec<TriMesh>,
-    /// Whether every check passes.
+    /// True if every check passes.
     pub passed: bool,
-    /// `code`, `severity`, `message`, `pieces` and `at` of each warning, what matters most first.
+    /// List of warnings, most important first: `code`, `severity`, `message`, `pieces` and `at` of each.
     pub warnings: Value,
-    /// What was done with the model and the wishes.
+    /// Notes on changes to the model and to the choices.
     pub notes: Vec<String>,
 }
 
 impl Kit {
-    /// [`save`] of its files.
+    /// Writes the kit's files with [`save`].
     pub fn save(&self, folder: &Path, may_replace: bool) -> Result<(), Problem> {
         save(&self.files, folder, may_replace)
     }
 }
 
-/// Makes the kit that `shellock build` makes. `stop` ends it early.
+/// Makes the same kit as `shellock build`. Setting `stop` ends the job early.
 pub fn design(
     request: &Request<'_>,
     news: &(dyn Fn(News<'_>) + Sync),
@@ -153,7 +155,8 @@ pub fn design(
     })
 }
 
-/// Divides the surface as `shellock segment` does: for each triangle the number of its piece, from 1.
+/// Divides the surface as `shellock segment` does. Returns the number of its piece, from 1, for each
+/// triangle.
 pub fn segment(
     request: &Request<'_>,
     news: &(dyn Fn(News<'_>) + Sync),
@@ -168,8 +171,9 @@ pub fn segment(
     Ok(stages::labels_of_file(&model, &surface))
 }
 
-/// Judges any assembly of closed meshes in place, mm, as `shellock verify` does: whether it goes together in this order
-/// and nothing but the last comes out. `pulled_out_along` is the way out of each piece; the first needs none.
+/// Verifies any assembly of closed meshes in assembled position, mm, as `shellock verify` does: the pieces
+/// must go together in this order, and only the last may come out. `pulled_out_along` is each piece's way
+/// out; the first piece needs none.
 pub fn verify(
     pieces: &[TriMesh],
     pulled_out_along: &[Option<[f64; 3]>],
@@ -199,42 +203,43 @@ pub fn verify(
     Ok(own_assembly::told(&verdict))
 }
 
-/// Writes a kit's files to `folder`, whole or not at all; replaces an earlier kit if `may_replace`, and nothing else.
+/// Writes a kit's files to `folder`, all or none. Replaces an earlier kit if `may_replace`, and nothing else.
 pub fn save(files: &[(String, Vec<u8>)], folder: &Path, may_replace: bool) -> Result<(), Problem> {
     let to = Destination::new(folder.to_owned(), may_replace)?;
     Ok(to.write(files)?)
 }
 
-/// Writes one file: whole or not at all.
+/// Writes one file, whole or not at all.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
     Ok(stages::write(path, bytes)?)
 }
 
-/// All models below `folder` but for what lies in `out`, by their paths within it, each with the path of its kit: as
-/// `shellock batch` takes them.
+/// Lists all models below `folder`, except those in `out`, as `shellock batch` takes them: each model's path
+/// within `folder`, with the path of its kit.
 pub fn models(folder: &Path, out: Option<&Path>) -> Result<Vec<(PathBuf, PathBuf)>, Problem> {
     Ok(batch::models(folder, out)?.into())
 }
 
-/// The tables of a batch, by the names of their files, from a JSON list of records as `shellock batch` keeps them.
+/// Builds the tables of a batch, each with its file name, from a JSON list of records as `shellock batch`
+/// keeps them.
 pub fn tables(records: &str) -> Result<Vec<(String, Vec<u8>)>, Problem> {
     let records: Vec<batch::record::Record> =
         serde_json::from_str(records).map_err(|e| Problem::wrong(format!("records: {e}")))?;
     Ok(batch::tables(&records))
 }
 
-/// Where another program than `shellock batch` keeps its record of a kit, within the folder for kits; `kind` tells whose
-/// it is.
+/// Path, within the folder for kits, at which a program other than `shellock batch` keeps its record of a
+/// kit. `kind` names that program.
 pub fn record_path(kit: &str, kind: &str) -> String {
     format!("{}/{}.{kind}.json", batch::RECORDS, batch::record_name(kit))
 }
 
-/// Whether a file with this name, within a kit's folder, is one that commands write there.
+/// Returns true if a file of this name, within a kit's folder, is one that commands write there.
 pub fn is_of_kit(name: &str) -> bool {
     is_of_kits(name)
 }
 
-/// All options: `name`, `group`, `help`, `kind`, `choices`, `default` and `is_many` of each.
+/// Lists all options as JSON: `name`, `group`, `help`, `kind`, `choices`, `default` and `is_many` of each.
 pub fn options() -> Value {
     choices::told(&Vec::new(), &[])
 }
@@ -244,7 +249,8 @@ fn options_of(request: &Request<'_>) -> Result<Options, Problem> {
     Ok(choices::options(&chosen, &[])?)
 }
 
-/// The model, by way of the bytes of its file: what is written of them stands in the kit.
+/// Reads the model by way of its file's bytes, because the kit states facts about these bytes, such as their
+/// hash.
 fn model(request: &Request<'_>, options: &Options) -> Result<Model, Problem> {
     let path = Path::new(request.name);
     let bytes = match request.model {

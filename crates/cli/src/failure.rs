@@ -1,4 +1,4 @@
-//! How a command can end badly, and the exit code of each way.
+//! Failures of a command, and the exit code of each.
 
 use std::path::{Path, PathBuf};
 
@@ -7,10 +7,10 @@ use shellock::stress_test::StressError;
 use shellock_formats::ReadError;
 use shellock_geom::check::InputError;
 
-/// The code of the warning, or failure, that the time was over.
+/// Code of the warning or failure that says that the time ran out.
 pub const TIME_UP: &str = "time-up";
 
-/// Why a command failed; each message says what to do where something can be done.
+/// Reason why a command failed; the message says what to do if anything can be done.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     #[error("{}: {source}", path.display())]
@@ -40,7 +40,7 @@ pub enum Failure {
     BatchStopped,
 }
 
-/// The option that helps, where there is one.
+/// Names the option that helps, if there is one.
 fn hint(error: &InputError, objects: &[String]) -> String {
     match error {
         InputError::Bodies(_) => {}
@@ -63,9 +63,9 @@ fn hint(error: &InputError, objects: &[String]) -> String {
     )
 }
 
-/// The first of some names, and how many more there are.
+/// Lists the first names, and the number of those left out.
 pub fn listed(names: &[String]) -> String {
-    /// Names that a message lists.
+    /// Number of names that a message lists.
     const N_LISTED: usize = 8;
     let first = names[..names.len().min(N_LISTED)].join(", ");
     match names.len().saturating_sub(N_LISTED) {
@@ -94,7 +94,7 @@ impl Failure {
         }
     }
 
-    /// What programs know it by, where they need to: as of a warning.
+    /// Code by which programs can recognise the failure, like the code of a warning; `None` for most.
     pub fn code(&self) -> Option<&'static str> {
         matches!(
             self,
@@ -106,7 +106,7 @@ impl Failure {
         .then_some(TIME_UP)
     }
 
-    /// A file that could not be written.
+    /// Returns a function that turns an error into the failure to write `path`.
     pub fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Unwritable {
             path: path.to_owned(),

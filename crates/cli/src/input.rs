@@ -1,4 +1,4 @@
-//! From a file to a solid in millimetres, with its labels.
+//! Reads a file into a solid in millimetres, with its labels.
 
 mod size;
 
@@ -23,38 +23,38 @@ use crate::shape::settle_hollow;
 use size::{DEFAULT_SIZE_MM, check_size, scale};
 pub use size::{is_usual, length};
 
-/// Larger files are refused, bytes: everything is read into memory.
+/// Size limit of input files, bytes; files are read into memory whole.
 const MAX_FILE_BYTES: u64 = 2 << 30;
-/// Surfaces with more triangles are described by fewer: most take twice the time with twice as many.
+/// Number of triangles above which a surface is simplified: most take twice the time with twice as many.
 pub const MANY_TRIANGLES: usize = 100_000;
 
-/// A model ready to be made.
+/// A model that is ready to be made.
 pub struct Model {
-    /// In assembly space, mm.
+    /// Closed surface in assembly space, mm.
     pub solid: Solid,
-    /// One label a triangle of `solid`, where there are labels.
+    /// Labels, one for each triangle of `solid`; `None` if there are none.
     pub labels: Option<Vec<i64>>,
     /// For each triangle of `solid`, the face of the file it came from.
     pub file_face: Vec<u32>,
-    /// How many faces the file has.
+    /// Number of faces in the file.
     pub n_file_faces: usize,
-    /// Assembly from file coordinates, 4 × 4, row-major.
+    /// Transform from file to assembly coordinates, 4 × 4, row-major.
     pub transform: [f64; 16],
-    /// File name without folders.
+    /// Name of the file, without folders.
     pub name: String,
-    /// Of the file's bytes.
+    /// SHA-256 of the file's bytes.
     pub sha256: String,
-    /// What a person should know about how the file was taken.
+    /// Notes for people on how the file was read.
     pub notes: Vec<String>,
-    /// What may be wrong with how it was taken.
+    /// Doubts about how the file was read.
     pub warnings: Vec<Warning>,
-    /// Which part of the file was taken.
+    /// Part of the file that was read.
     pub selection: Selection,
-    /// What was changed to make one body of it.
+    /// Repairs that made one body of the file's surface.
     pub repairs: Vec<Repair>,
 }
 
-/// Reads a file whole.
+/// Reads a file whole; fails if it is larger than 2 GiB.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let unreadable = |source| Failure::Unreadable {
         path: path.to_owned(),
@@ -68,7 +68,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
             path.display()
         )));
     }
-    // A device tells no size.
+    // A device has no size in its metadata, so the read is limited, too.
     let mut bytes = Vec::new();
     fs::File::open(path)
         .and_then(|file| file.take(MAX_FILE_BYTES).read_to_end(&mut bytes))
@@ -81,12 +81,12 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// The mesh in a file.
+/// Loads the mesh in a file; also returns the file's bytes.
 pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
     load_selected(path, &Selection::default())
 }
 
-/// The part of the mesh in a file that `selection` names.
+/// Loads the part of a file's mesh that `selection` names; also returns the file's bytes.
 pub fn load_selected(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
     let extension = path.extension().and_then(|e| e.to_str());
@@ -97,7 +97,7 @@ pub fn load_selected(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<
     Ok((loaded, bytes))
 }
 
-/// The part of a file that is asked for.
+/// Part of a file that the options ask for.
 pub fn selection(options: &Options) -> Selection {
     Selection {
         object: options.object.clone(),
@@ -105,7 +105,7 @@ pub fn selection(options: &Options) -> Selection {
     }
 }
 
-/// What may be done to a surface that is no body.
+/// Repair mode that the two options select.
 pub fn repair_mode(no_repair: bool, largest: bool) -> RepairMode {
     match (no_repair, largest) {
         (true, _) => RepairMode::Refuse,
@@ -114,7 +114,7 @@ pub fn repair_mode(no_repair: bool, largest: bool) -> RepairMode {
     }
 }
 
-/// The body in what was read from `path`.
+/// Repairs the mesh that was read from `path` into one body.
 pub fn repaired(
     path: &Path,
     loaded: &Loaded,
@@ -148,7 +148,7 @@ pub fn objects(loaded: &Loaded) -> Vec<String> {
     }
 }
 
-/// The model in a file, scaled, with the labels that go with it.
+/// Reads the model in a file, scaled, with its labels.
 pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
     session.during("reading", || {
         let (loaded, bytes) = load_selected(path, &selection(options))?;
@@ -156,12 +156,12 @@ pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model,
     })
 }
 
-/// The same, described by fewer triangles where it has very many.
+/// Reads the model in a file and simplifies it if it has more than [`MANY_TRIANGLES`] triangles.
 pub fn simple_model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
     simple(session, model(session, path, options)?, options)
 }
 
-/// `model` described by fewer triangles where it has very many.
+/// Simplifies `model` if it has more than [`MANY_TRIANGLES`] triangles and the options do not forbid it.
 pub fn simple(session: &Session, model: Model, options: &Options) -> Result<Model, Failure> {
     let n_triangles = model.solid.mesh().triangles.len();
     if n_triangles <= MANY_TRIANGLES || options.resolution == 0.0 {
@@ -170,7 +170,7 @@ pub fn simple(session: &Session, model: Model, options: &Options) -> Result<Mode
     session.during("simplifying", || simplified(model, options.resolution))
 }
 
-/// `model` with fewer triangles, all within `resolution_mm` of its surface, and a note that says so.
+/// Simplifies `model` to triangles within `resolution_mm` of its surface, and adds a note on the result.
 fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
     let n_before = model.solid.mesh().triangles.len();
     match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
@@ -194,7 +194,7 @@ fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
     Ok(model)
 }
 
-/// The model in what was read from `path`.
+/// Makes a model of what was read from `path`: repaired, scaled, with its labels.
 pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -> Result<Model, Failure> {
     let sha256 = sha256(bytes);
     if options.model_sha256.as_ref().is_some_and(|of| *of != sha256) {
@@ -245,7 +245,8 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
     Ok(made)
 }
 
-/// The labels that the model's file has itself, one a triangle as read.
+/// Labels in the model's own file, one a triangle as read; `None` if the surface is to be divided
+/// automatically.
 fn own_labels<'a>(
     path: &Path,
     from: LabelsFrom,
@@ -296,7 +297,7 @@ fn own_labels<'a>(
     loaded.labels(source).map(Some).ok_or_else(wrong)
 }
 
-/// A solid in file units as a model of its own.
+/// Scales a solid in file units and makes a model of it, without labels or notes.
 fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
     let mut mesh = solid.into_mesh();
     // Far from the origin, 32-bit files would lose the detail: such models are moved to it.
@@ -329,7 +330,7 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
     })
 }
 
-/// A figure that the program makes itself, as if it came from a file.
+/// Makes one of the program's own figures as if it had been read from a file.
 pub fn figure(name: &str, options: &Options) -> Result<Model, Failure> {
     let (solid, _) = shellock_figure(name, options.size.or(options.height).unwrap_or(DEFAULT_SIZE_MM))?;
     let bytes = shellock_formats::write_stl_binary(solid.mesh());
@@ -338,9 +339,10 @@ pub fn figure(name: &str, options: &Options) -> Result<Model, Failure> {
     Ok(model)
 }
 
-/// The figure called `name`, its longest side `size_mm`, and the limb that each triangle is on.
+/// Makes the figure called `name` with its longest side `size_mm`; also returns the limb of each triangle.
 pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Failure> {
-    /// Polygons of about 1/95 of the size: smooth to the eye, some 55 000 triangles.
+    /// Cells along the longest side: polygons of about 1/95 of the size, smooth to the eye, some 55 000
+    /// triangles.
     const CELLS: f64 = 94.0;
     let figure = shellock::figure::Figure::named(name).ok_or_else(|| {
         let all: Vec<&str> = shellock::figure::Figure::ALL.iter().map(|f| f.name()).collect();
@@ -354,7 +356,7 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
     ))
 }
 
-/// The labels in `file`, one a triangle of the solid.
+/// Reads the labels in `file`, one a triangle of the solid.
 fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>, Failure> {
     let n = loaded.n_file_faces();
     let is_ply = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
@@ -392,7 +394,7 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
 mod tests {
     use super::*;
 
-    /// A figure of the program, labelled in two halves, as if it came from a file of its own faces.
+    /// A figure of the program, labelled in two halves, as if it came from a file with the same faces.
     fn halved() -> Model {
         let (solid, _) = shellock_figure("vase", 40.0).expect("there is such a figure");
         let mut model = made_of(solid, 1.0, Path::new("vase.stl")).expect("it is small");

@@ -1,4 +1,4 @@
-//! `inspect`: what a file holds, and what would be made of it.
+//! `inspect`: says what a file holds and what would be made of it.
 
 use std::path::Path;
 
@@ -19,19 +19,19 @@ use crate::place::Standing;
 use crate::shape::{shape_warnings, wall_mm};
 use crate::told::print_warnings;
 
-/// Thin places that are told one by one.
+/// Number of thin places that are listed one by one.
 const N_TOLD: usize = 3;
 
-/// What is asked about a model.
+/// Extent of the questions about a model.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Wanted {
-    /// What its file holds.
+    /// Contents of the file only.
     File,
-    /// Its division, too.
+    /// Division of the surface, too.
     Division,
 }
 
-/// `shellock inspect`.
+/// Runs `shellock inspect` and returns the exit code.
 pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted) -> Result<u8, Failure> {
     let (loaded, bytes) = session.during("reading", || load_selected(file, &selection(options)))?;
     let found = inspection(&weld(&loaded.mesh).mesh);
@@ -52,7 +52,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
     };
     if session.is_json {
         println!("{}", told(&loaded, &found, &model, &thin, division.as_ref()));
-        // Why not is in what was printed.
+        // The printed JSON holds the reason.
         return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
     let model = model.inspect_err(|_| loaded.notes.iter().for_each(|note| println!("note: {note}")))?;
@@ -60,7 +60,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
     Ok(0)
 }
 
-/// What the file holds, for people.
+/// Prints the contents of the file for people.
 fn print_file(loaded: &Loaded, found: &Inspection) {
     let (n, size) = (found.bodies.len(), loaded.bounds().size());
     let bodies = if n == 1 { "body" } else { "bodies" };
@@ -93,7 +93,7 @@ fn labellings(loaded: &Loaded) -> Vec<String> {
     loaded.labellings.iter().map(|l| l.source.to_string()).collect()
 }
 
-/// What would be made of it, for people.
+/// Prints what would be made of the model, for people.
 fn print_model(
     session: &Session,
     model: &Model,
@@ -127,7 +127,7 @@ fn print_model(
     }
 }
 
-/// All of it, for machines.
+/// Builds the whole answer as JSON.
 fn told(
     loaded: &Loaded,
     found: &Inspection,
@@ -141,7 +141,7 @@ fn told(
         |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),
     );
     let error = model.as_ref().err().map(ToString::to_string);
-    // What was read is worth knowing where it cannot be made, too.
+    // A model that cannot be made still has notes from reading.
     let notes = if model.is_ok() { notes } else { &loaded.notes[..] };
     let of_model = model.iter().flat_map(|m| &m.warnings).map(ToString::to_string);
     let warnings: Vec<String> = of_model.chain(thin.iter().cloned()).collect();
@@ -168,13 +168,13 @@ fn unit(loaded: &Loaded) -> String {
         .map_or_else(String::new, |mm| format!(" of {mm} mm"))
 }
 
-/// Where a model is too thin for a cavity between two walls, and how thin; nothing where it is thick enough.
+/// Warns where a model is too thin for a cavity between two walls; empty if it is thick enough.
 pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
     let wall_mm = wall_mm(options);
     let places = thin_places(&model.solid, 2.0 * wall_mm);
     let area_mm2: f64 = places.iter().map(|p| p.area_mm2).sum();
     let percent = 100.0 * area_mm2 / model.solid.mesh().area();
-    // What rounds to nothing is a thin edge somewhere.
+    // A share that rounds to 0 % is just a thin edge somewhere.
     if percent < 0.5 {
         return Vec::new();
     }

@@ -1,20 +1,20 @@
-//! Ctrl-C: stages end by themselves where they look for it; what does not within a moment is ended from outside,
-//! but never while files are written.
+//! Ctrl-C: stages end by themselves where they check for it. A moment later the process is ended, but never
+//! while files are being written.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// How long stages have to end by themselves.
+/// Time for stages to end by themselves.
 const PATIENCE: Duration = Duration::from_millis(300);
 
-/// How often it is looked whether files are written.
+/// Interval at which the end of writing is checked.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// How many have files or folders that must not be left behind.
+/// Number of writers with files or folders that must not be left behind.
 static N_WRITING: AtomicUsize = AtomicUsize::new(0);
 
-/// Nothing ends the program while there is one.
+/// Guard that keeps the program running while files are written.
 pub struct Writing(());
 
 impl Writing {
@@ -30,18 +30,18 @@ impl Drop for Writing {
     }
 }
 
-/// Sets `stop` with Ctrl-C; a moment later `end` tells it, and the program ends with code 130.
+/// On Ctrl-C, sets `stop`; a moment later calls `end`, and the program ends with code 130.
 pub fn watch(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Copy + 'static) {
     let stop = Arc::clone(stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.
     let _ = ctrlc::set_handler(move || stop_soon(&stop, end));
 }
 
-/// The same where standard input ends: a program that started this one wants no more of it, or is gone.
+/// Does the same when standard input ends: the program that started this one has stopped it, or is gone.
 pub fn watch_stdin(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Copy + 'static) {
     let stop = Arc::clone(stop);
     std::thread::spawn(move || {
-        // An error is an end, too.
+        // A read error counts as the end of input.
         let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
         stop_soon(&stop, end);
     });

@@ -1,5 +1,5 @@
-//! The command line of Shellock: arguments → parameters → library → files; and the same jobs for programs that embed
-//! them ([`embed`]).
+//! Command line of Shellock: arguments → parameters → library → files. Programs can embed the same jobs
+//! ([`embed`]).
 
 mod args;
 mod batch;
@@ -48,27 +48,27 @@ use serde_json::json;
 use args::Command;
 use failure::Failure;
 
-/// The guide's programs, compiled and run with the tests.
+/// Programs in the guide, compiled and run with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/library.md")]
 struct Guide;
 
-/// What every command gets.
+/// Settings and state that every command gets.
 pub struct Session {
-    /// Whether to print one JSON object instead of text.
+    /// True if one JSON object is printed instead of text.
     pub is_json: bool,
-    /// Whether to tell all.
+    /// True if every check, note and figure is printed.
     pub is_verbose: bool,
-    /// How progress is shown.
+    /// Form in which progress is shown.
     pub shown: progress::Shown,
-    /// Becomes true with Ctrl-C.
+    /// Flag that becomes true with Ctrl-C.
     pub stop: Arc<AtomicBool>,
-    /// When it began.
+    /// Start time of the program.
     pub since: std::time::Instant,
 }
 
 impl Session {
-    /// Shows nothing, and ends with `stop`.
+    /// Creates a session that shows nothing and ends with `stop`.
     fn silent(stop: &Arc<AtomicBool>) -> Self {
         Self {
             is_json: false,
@@ -79,7 +79,7 @@ impl Session {
         }
     }
 
-    /// Shows that `name` goes on while `work` is done.
+    /// Runs `work` and shows progress under `name` meanwhile.
     pub fn during<T>(&self, name: &str, work: impl FnOnce() -> T) -> T {
         let display = progress::Display::new(self.shown);
         display.show(shellock::context::Progress::Stage { name, n_steps: 0 });
@@ -89,10 +89,10 @@ impl Session {
     }
 }
 
-/// More threads than this are not made: each has a stack, and no computer has as many cores.
+/// Limit on the number of threads: each has a stack, and no computer has as many cores.
 const MOST_THREADS: usize = 256;
 
-/// The whole program: what its arguments ask for.
+/// Runs the program with its arguments and returns its exit code.
 pub fn command_line() -> ExitCode {
     let wants_json = std::env::args_os().any(|word| word == "--json");
     let cli = match config::command_line(std::env::args_os().collect()) {
@@ -110,7 +110,7 @@ pub fn command_line() -> ExitCode {
     };
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        // What becomes an error is told as one.
+        // A guarded panic becomes an error, which is reported as such.
         if shellock_geom::boolean::is_guarded() {
             return;
         }
@@ -169,7 +169,7 @@ pub fn command_line() -> ExitCode {
     }
 }
 
-/// Says what is wrong: one JSON object on standard output, or a line on standard error.
+/// Reports an error: as one JSON object on standard output, or as a line on standard error.
 fn refuse(is_json: bool, problem: &str, code: u8) -> ExitCode {
     if is_json {
         println!(
@@ -182,7 +182,8 @@ fn refuse(is_json: bool, problem: &str, code: u8) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Ends where standard output takes no more: a full disk is told, a reader that has seen enough is not.
+/// Ends the program when standard output fails. A full disk is reported; a reader that closed the pipe is
+/// not.
 fn unprinted(what: &str) -> ! {
     if !what.contains("Broken pipe") {
         eprintln!("error: {what}");
@@ -190,7 +191,7 @@ fn unprinted(what: &str) -> ! {
     std::process::exit(4)
 }
 
-/// Events go with JSON; what is quiet shows neither.
+/// Form of progress for the options: events with JSON, nothing when quiet, else for people.
 fn shown(cli: &args::Cli) -> progress::Shown {
     match (cli.quiet, cli.json) {
         (true, _) => progress::Shown::Nothing,

@@ -1,5 +1,5 @@
-//! What the kit bears, as the page shows it: each load with its figure, where it acts, what moves and what gives
-//! way.
+//! Loads on the page: each with its figure, the place where it acts, the deformation, and the seam that
+//! fails.
 
 use shellock::design::Design;
 use shellock::handling::{Deed, Failure};
@@ -11,10 +11,10 @@ use shellock_render::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
 use crate::bears;
 use crate::place::Standing;
 
-/// Points of a line along a seam, at most.
+/// Largest number of points in a line along a seam.
 const LINE_POINTS: usize = 120;
 
-/// All loads that people are told of, standing; empty where none were simulated.
+/// All loads that the page shows, turned upright by `stand`; empty if none were simulated.
 pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3) -> ReportLoads {
     let kit = &design.kit;
     let (carriers, places) = carriers(&kit.deformed, kit.pieces.len());
@@ -46,7 +46,7 @@ pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3)
     }
 }
 
-/// What holds for all loads.
+/// Note that holds for all loads.
 fn note(design: &Design) -> String {
     let is_there = |told| design.kit.deformed.loads.iter().any(|l| l.told == told);
     let top = if is_there(Told::Top) {
@@ -61,13 +61,13 @@ fn note(design: &Design) -> String {
     )
 }
 
-/// By how many times the load is shown: as much as the kit bears, which is where something gives way.
+/// Load factor at which a load is shown: the largest that the kit can take, where something begins to fail.
 fn shown_factor(load: &DeformedLoad) -> f64 {
     let factor = bears::counted(&load.borne);
     if factor > 0.0 { factor } else { 1.0 }
 }
 
-/// The surface of each piece, and where its points are among all.
+/// Surface mesh of each piece, and the indices of its points among all.
 fn carriers(deformed: &Deformed, n_pieces: usize) -> (Vec<TriMesh>, Vec<Vec<usize>>) {
     let mut places = vec![Vec::new(); n_pieces];
     let mut meshes = vec![TriMesh::default(); n_pieces];
@@ -86,7 +86,7 @@ fn carriers(deformed: &Deformed, n_pieces: usize) -> (Vec<TriMesh>, Vec<Vec<usiz
     (meshes, places)
 }
 
-/// What acts, with how much of it is borne.
+/// Arrows of the forces that act, labelled with their figure or role.
 fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow> {
     let words: [&str; 2] = match load.borne.deed {
         Deed::GripNarrow | Deed::GripWide => ["one finger", "the other"],
@@ -107,7 +107,7 @@ fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow>
     load.touches.iter().take(n).zip(words).map(arrow).collect()
 }
 
-/// A place of the floor and its normal, where there is one.
+/// A point of the floor and its normal, for loads with a floor.
 fn floor(load: &DeformedLoad) -> Option<[Vec3; 2]> {
     let touch = match load.borne.deed {
         Deed::PressTop | Deed::PressMiddle | Deed::PressSide { .. } => load.touches.get(1),
@@ -117,7 +117,7 @@ fn floor(load: &DeformedLoad) -> Option<[Vec3; 2]> {
     Some([touch.at, touch.force_n.try_normalize()?])
 }
 
-/// Where it gives way: the seam through that place.
+/// Place where a kit fails, and the seam through it.
 fn place(surface: &SegmentedSurface, first: &GivesWay, stand: impl Fn(Vec3) -> Vec3) -> ReportPlace {
     let [a, b] = first.between;
     let name = match first.how {
@@ -138,7 +138,8 @@ fn place(surface: &SegmentedSurface, first: &GivesWay, stand: impl Fn(Vec3) -> V
     }
 }
 
-/// The seam of two pieces that comes nearest to a place, by its points in order; a loop ends where it begins.
+/// Points, in order, of the seam between two pieces that comes nearest to a place; a loop ends where it
+/// begins.
 fn seam_through(surface: &SegmentedSurface, between: [PatchId; 2], at: Vec3) -> Option<Vec<Vec3>> {
     let distance = |seam: &Seam| {
         let distances = seam.points.iter().map(|p| p.distance(at));
@@ -149,7 +150,7 @@ fn seam_through(surface: &SegmentedSurface, between: [PatchId; 2], at: Vec3) -> 
         .into_iter()
         .filter(|s| between.contains(&s.a) && between.contains(&s.b));
     let nearest = own.min_by(|x, y| distance(x).total_cmp(&distance(y)))?;
-    // All of them are more than a picture needs.
+    // A picture needs fewer points than a seam has.
     let n = nearest.points.len() - 1;
     let every = n.div_ceil(LINE_POINTS).max(1);
     let last = nearest.points.last().filter(|_| !n.is_multiple_of(every));
@@ -168,7 +169,7 @@ fn seam_through(surface: &SegmentedSurface, between: [PatchId; 2], at: Vec3) -> 
 mod tests {
     use super::*;
 
-    /// Two pyramids on a hexagon, halved: pieces meet along a loop in y = 0.
+    /// Two pyramids on a hexagon, halved: the two pieces meet along a loop in the plane y = 0.
     fn halved() -> SegmentedSurface {
         let rim = (0..6).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_3).sin_cos();

@@ -1,4 +1,4 @@
-//! The program `shellock`.
+//! Entry point of the program `shellock`.
 
 use std::process::ExitCode;
 

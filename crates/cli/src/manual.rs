@@ -1,4 +1,4 @@
-//! Completions and manual pages, made from the same declarations as the command line.
+//! Shell completions and manual pages, made from the declarations of the command line.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -8,7 +8,7 @@ use crate::args;
 use crate::failure::Failure;
 use crate::stages::write as write_file;
 
-/// `shellock completions`.
+/// Runs `shellock completions` and returns the exit code.
 pub fn completions(shell: clap_complete::Shell) -> u8 {
     let mut bytes = Vec::new();
     clap_complete::generate(shell, &mut args::command(), "shellock", &mut bytes);
@@ -21,7 +21,7 @@ pub fn completions(shell: clap_complete::Shell) -> u8 {
     ) * 4
 }
 
-/// `shellock manual`: `shellock.1` and a page for each command.
+/// Runs `shellock manual`: writes `shellock.1` and a page for each command.
 pub fn write(folder: &Path) -> Result<u8, Failure> {
     fs::create_dir_all(folder).map_err(Failure::unwritable(folder))?;
     let mut root = args::command();

@@ -1,9 +1,9 @@
-//! What to say where a name is none that is known.
+//! Error message for an unknown name.
 
-/// "there is no printer "fmd": did you mean fdm? Choose one of sla, fdm".
+/// Writes a message such as "there is no printer "fmd": did you mean fdm? Choose one of sla, fdm".
 pub fn no_such(what: &str, name: &str, known: &[&str]) -> String {
     let slips = |k: &&&str| strsim::damerau_levenshtein(&name.to_lowercase(), &k.to_lowercase());
-    // A third of the letters, at least one.
+    // Near names differ by at most a third of the letters, or one letter.
     let is_near = |k: &&&str| slips(k) <= (k.chars().count() / 3).max(1);
     let nearest = known.iter().filter(is_near).min_by_key(slips);
     let all = known.join(", ");

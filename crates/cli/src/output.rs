@@ -1,4 +1,4 @@
-//! A finished kit as files.
+//! Writes a finished kit as files.
 
 use std::fs;
 use std::io;
@@ -25,12 +25,12 @@ use crate::page;
 use crate::paint::painted;
 use crate::printing::Printing;
 
-/// The plan's name within a kit.
+/// Name of the plan within a kit.
 pub const PLAN: &str = "plan.json";
-/// The certificate's name within a kit.
+/// Name of the certificate within a kit.
 pub const CERTIFICATE: &str = "certificate.json";
 
-/// What commands write into a kit besides pieces and plates.
+/// Names of the files that commands write into a kit, besides pieces and plates.
 const KIT_FILES: [&str; 13] = [
     PLAN,
     CERTIFICATE,
@@ -47,20 +47,20 @@ const KIT_FILES: [&str; 13] = [
     "stress.svg",
 ];
 
-/// Figures of a kit that people and machines ask for.
+/// Figures of a kit, for people and machines.
 pub struct Summary {
-    /// Material of all pieces over the solid model's.
+    /// Volume of all pieces over the volume of the solid model.
     pub volume_ratio: f64,
-    /// What the pieces weigh without supports, g.
+    /// Mass of the pieces without supports, g.
     pub grams: f64,
     /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
     pub connector_share: f64,
-    /// Greatest share of a piece's volume that is thinner than the thinnest wall.
+    /// Largest share of a piece's volume that is thinner than the thinnest printable wall, in [0, 1].
     pub thin_share: f64,
 }
 
-/// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the
-/// end.
+/// Folder of a kit to be written. All files are first written to a folder beside it, which is moved into
+/// place at the end.
 pub struct Destination {
     folder: PathBuf,
     may_replace: bool,
@@ -90,12 +90,12 @@ impl Destination {
             folder,
             may_replace: force,
         };
-        // Now, not after a minute's work.
+        // Fails now rather than after a minute's work.
         made.temporary()?;
         Ok(made)
     }
 
-    /// A folder beside the kit's that vanishes when it is dropped.
+    /// Creates a folder beside the kit's; it is deleted when dropped.
     fn temporary(&self) -> Result<tempfile::TempDir, Failure> {
         let parent = match self.folder.parent() {
             Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
@@ -112,14 +112,14 @@ impl Destination {
             .map_err(unwritable)
     }
 
-    /// The folder.
+    /// Path of the kit's folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Writes all files; the folder appears whole or not at all.
     ///
-    /// Where the new kit cannot take its place, an earlier one stays as it was.
+    /// If the new kit cannot be moved into place, an earlier kit stays as it was.
     pub fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
         let _writing = Writing::begin();
         let temporary = self.temporary()?;
@@ -141,7 +141,7 @@ impl Destination {
             Ok(()) => Ok(()),
             Err(NotReplaced::Back(source)) => Err(Failure::unwritable(&self.folder)(source)),
             Err(NotReplaced::Lost(source)) => {
-                // Else it would vanish with the temporary folder.
+                // Otherwise the earlier kit would be deleted with the temporary folder.
                 let kept = temporary.keep().join("earlier");
                 let words = format!("{source}; the kit that was there is now in {}", kept.display());
                 Err(Failure::unwritable(&self.folder)(io::Error::new(
@@ -152,29 +152,29 @@ impl Destination {
         }
     }
 
-    /// Moves what is in the folder's place to `earlier`: a kit, or nothing at all.
+    /// Moves the existing folder to `earlier`: a kit, or an empty folder. Fails for anything else.
     fn set_aside(&self, earlier: &Path) -> io::Result<()> {
         let is_kit = self.folder.join(PLAN).is_file();
         if self.may_replace && is_kit {
             fs::rename(&self.folder, earlier)
         } else {
-            // Fails where there is anything in it.
+            // Fails if the folder is not empty.
             fs::remove_dir(&self.folder)?;
             fs::create_dir(earlier)
         }
     }
 }
 
-/// Why a kit is not in its place.
+/// Reason why a new kit could not be moved into place.
 #[derive(Debug)]
 enum NotReplaced {
-    /// The earlier one is back in its place.
+    /// Failed, and the earlier kit is back in its place.
     Back(io::Error),
-    /// The earlier one could not be put back.
+    /// Failed, and the earlier kit could not be put back.
     Lost(io::Error),
 }
 
-/// Moves the folder `made` to `place`, or else the folder `earlier`, which was there before.
+/// Moves the folder `made` to `place`. If that fails, moves `earlier` back, which was there before.
 fn replace(made: &Path, place: &Path, earlier: &Path) -> Result<(), NotReplaced> {
     let Err(source) = fs::rename(made, place) else {
         return Ok(());
@@ -185,7 +185,7 @@ fn replace(made: &Path, place: &Path, earlier: &Path) -> Result<(), NotReplaced>
     })
 }
 
-/// Name of a file in the folder of a kit that no command of this program writes.
+/// Name of a file in a kit's folder that no command of this program writes; the first by name.
 fn foreign_file(folder: &Path) -> Option<String> {
     let mut names: Vec<String> = Vec::new();
     let mut left = vec![PathBuf::new()];
@@ -203,7 +203,8 @@ fn foreign_file(folder: &Path) -> Option<String> {
     names.into_iter().find(|name| !is_of_kits(name))
 }
 
-/// Whether a file with this name, of a kit's folder, is written by commands, of this version or an earlier one.
+/// Returns true if commands, of this version or an earlier one, write a file of this name into a kit's
+/// folder.
 pub fn is_of_kits(name: &str) -> bool {
     let numbered = |prefix: &str, end: &str| {
         let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(end));
@@ -212,7 +213,7 @@ pub fn is_of_kits(name: &str) -> bool {
     KIT_FILES.contains(&name) || numbered("pieces/piece-", ".stl") || numbered("plates/plate-", ".3mf")
 }
 
-/// All files of a kit, and its figures.
+/// Builds all files of a kit, and its figures.
 pub fn files(
     model: &Model,
     options: &Options,
@@ -336,7 +337,7 @@ fn plan_file(
     PlanFile::of(settings, design, &told)
 }
 
-/// All pieces in place, named and coloured; on the plate they stand as the model was given.
+/// All pieces in place, named and coloured, as a 3MF in the model's own orientation.
 fn assembly(design: &Design) -> Vec<u8> {
     let names: Vec<String> = design.kit.pieces.ids().map(|p| format!("piece {p}")).collect();
     let objects: Vec<NamedObject> = design
@@ -355,8 +356,8 @@ fn assembly(design: &Design) -> Vec<u8> {
     write_3mf(&objects)
 }
 
-/// What is claimed of the kit whose pieces are these files, in order of their ids; `others` are certified as
-/// they are.
+/// Builds the certificate of a kit. `files` are the pieces' files in order of their ids; `others` are listed
+/// with their hashes. `None` where nothing can be certified.
 fn certificate(
     files: &[(String, Vec<u8>)],
     others: &[(String, Vec<u8>)],
@@ -396,14 +397,14 @@ fn certificate(
     .map(|c| certificate_bytes(&c))
 }
 
-/// As it is written to [`CERTIFICATE`].
+/// Bytes of a certificate as written to [`CERTIFICATE`].
 pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     let mut bytes = serde_json::to_vec(certificate).expect("numbers and strings can be written");
     bytes.push(b'\n');
     bytes
 }
 
-/// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
+/// Range of the sizes of connectors that were made, mm, as in "2.5" or "2.0–3.4".
 pub fn connector_sizes(design: &Design) -> String {
     if design.kit.sizes.pairs().next().is_none() {
         return design.kit.sizes.default_mm().to_string();
@@ -425,7 +426,7 @@ pub fn connector_sizes(design: &Design) -> String {
     }
 }
 
-/// The model's stress, and that along its seams.
+/// Chart of the stress in the model and along its seams, as SVG.
 fn stress_chart(options: &Options, settings: &Settings, design: &Design, strength: &Strength) -> String {
     let map = StressMap::new(strength);
     let seams: Vec<SeamStress> = design
@@ -444,7 +445,7 @@ fn stress_chart(options: &Options, settings: &Settings, design: &Design, strengt
     })
 }
 
-/// Turned so that `up` becomes z.
+/// Turns a vector so that `up` becomes z.
 pub fn standing(up: Axis, v: Vec3) -> Vec3 {
     match up {
         Axis::X => Vec3::new(-v.z, v.y, v.x),
@@ -453,7 +454,7 @@ pub fn standing(up: Axis, v: Vec3) -> Vec3 {
     }
 }
 
-/// Turned back: `lying(up, standing(up, v))` is `v`.
+/// Turns a vector back: `lying(up, standing(up, v))` is `v`.
 pub fn lying(up: Axis, v: Vec3) -> Vec3 {
     match up {
         Axis::X => Vec3::new(v.z, v.y, -v.x),
@@ -466,7 +467,7 @@ pub fn lying(up: Axis, v: Vec3) -> Vec3 {
 mod tests {
     use super::*;
 
-    /// A folder with an earlier kit of one piece, and the way to replace it.
+    /// An earlier kit of one piece in a folder, and a destination that may replace it.
     fn earlier_kit(dir: &Path) -> Destination {
         let folder = dir.join("kit");
         fs::create_dir_all(folder.join("pieces")).unwrap();
@@ -500,7 +501,7 @@ mod tests {
     fn an_earlier_kit_comes_back_where_the_new_one_cannot_take_its_place() {
         let dir = tempfile::tempdir().unwrap();
         let to = earlier_kit(dir.path());
-        // No files make no folder, so that the last rename has nothing to move.
+        // Without files no folder is made, so the last rename has nothing to move.
         assert!(matches!(to.write(&[]), Err(Failure::Unwritable { .. })));
         for name in [PLAN, "pieces/piece-1.stl"] {
             assert_eq!(fs::read(to.folder().join(name)).unwrap(), b"earlier", "{name}");
@@ -528,7 +529,7 @@ mod tests {
     fn an_earlier_kit_that_cannot_be_put_back_is_not_deleted() {
         let dir = tempfile::tempdir().unwrap();
         let [made, place, earlier] = ["made", "place", "earlier"].map(|name| dir.path().join(name));
-        // A file in the place: no folder can be moved there.
+        // A file is in the place, so no folder can be moved there.
         fs::write(&place, "").unwrap();
         for folder in [&made, &earlier] {
             fs::create_dir(folder).unwrap();

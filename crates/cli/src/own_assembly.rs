@@ -1,4 +1,5 @@
-//! `verify` for anybody's assembly: a folder of meshes and `assembly.json`, which says how they go together.
+//! `verify` for a user's own assembly: a folder of meshes with an `assembly.json` that says how they go
+//! together.
 
 use std::path::{Component, Path};
 
@@ -20,34 +21,34 @@ use crate::progress::Display;
 use crate::stages::write;
 use crate::told::print_verdict;
 
-/// The file that says how the pieces go together.
+/// Name of the file that says how the pieces go together.
 pub const ASSEMBLY: &str = "assembly.json";
 
-/// What it has to look like.
+/// Example of the file, for error messages.
 const HOW: &str = "it looks like { \"clearance\": 0.1, \"pieces\": [{ \"file\": \"first.stl\" }, \
                    { \"file\": \"key.stl\", \"pulled_out_along\": [0, 0, 1] }] }";
 
-/// What `assembly.json` says.
+/// Contents of the file `assembly.json`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AssemblyFile {
     /// Gap between mating faces, mm.
     clearance: f64,
-    /// First to last as they are put together; the last is the key.
+    /// Pieces in order of installation, first to last; the last is the key.
     pieces: Vec<PieceEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PieceEntry {
-    /// A mesh in the folder, in assembled position, mm.
+    /// Mesh file in the folder, in assembled position, mm.
     file: String,
-    /// The way along which it is pulled out again; the first piece needs none.
+    /// Direction in which the piece is pulled out again; the first piece needs none.
     #[serde(default)]
     pulled_out_along: Option<[f64; 3]>,
 }
 
-/// `shellock verify FOLDER`, where the folder has an `assembly.json`.
+/// Runs `shellock verify FOLDER` for a folder with an `assembly.json`; returns the exit code.
 pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<u8, Failure> {
     if let Some(model) = model {
         return Err(Failure::Wrong(format!(
@@ -106,7 +107,7 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
     Ok(print(session, &verdict))
 }
 
-/// The order and directions of pieces by their names, or what is wrong with them or the clearance, mm.
+/// Plan of the named pieces: their order and directions. Fails if a direction or the clearance, mm, is wrong.
 pub fn plan(pieces: &[(&str, Option<[f64; 3]>)], clearance_mm: f64) -> Result<InstallationPlan, String> {
     if !(0.0..=1.0).contains(&clearance_mm) {
         return Err(format!("a clearance of {clearance_mm} mm is none; 0 to 1 mm are"));
@@ -131,7 +132,7 @@ pub fn plan(pieces: &[(&str, Option<[f64; 3]>)], clearance_mm: f64) -> Result<In
     steps.map(InstallationPlan::new)
 }
 
-/// An assembly of pieces of no model, which press nowhere.
+/// Assembly of pieces without a model and without press fits.
 pub fn assembly<'a>(pieces: &'a IdVec<PatchId, TriMesh>, plan: &'a InstallationPlan) -> Assembly<'a> {
     Assembly {
         model: None,
@@ -141,7 +142,7 @@ pub fn assembly<'a>(pieces: &'a IdVec<PatchId, TriMesh>, plan: &'a InstallationP
     }
 }
 
-/// How it is judged.
+/// Parameters of the verification for a clearance, mm.
 pub fn params(clearance_mm: f64) -> VerifyParams {
     VerifyParams {
         clearance_mm,
@@ -149,13 +150,13 @@ pub fn params(clearance_mm: f64) -> VerifyParams {
     }
 }
 
-/// The verdict for machines.
+/// Verdict as JSON for machines.
 pub fn told(verdict: &Verdict) -> serde_json::Value {
     let found = &verdict.verification;
     json!({ "passed": found.passed(), "checks": found.checks, "findings": found.findings })
 }
 
-/// Prints the verdict; the exit code.
+/// Prints the verdict and returns the exit code.
 fn print(session: &Session, verdict: &Verdict) -> u8 {
     let found = &verdict.verification;
     let code = u8::from(!found.passed());

@@ -1,4 +1,4 @@
-//! What people look at: the page, the picture and the booklet of a kit.
+//! Page, picture and booklet of a kit.
 
 use std::path::Path;
 
@@ -24,11 +24,10 @@ use crate::printing::Printing;
 use crate::tabs;
 use crate::told::{bearing, scope};
 
-/// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
+/// Tolerance of shown pieces, as a share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
 const SEEN: f64 = 3e-4;
 
-/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up`
-/// becomes z.
+/// Builds the page, the picture, and the booklet if it is wanted. All show the model upright: `up` becomes z.
 pub fn report(
     model: &Model,
     options: &Options,
@@ -78,7 +77,7 @@ pub fn report(
     let quantities = quantities(design);
     let looks = looks(&pieces);
     let has_passed = design.kit.verification.passed();
-    // What failed is not to be printed.
+    // A kit that failed is not to be printed.
     let tabs = if has_passed {
         let made = design.kit.pieces.as_slice();
         vec![
@@ -126,7 +125,7 @@ pub fn report(
     (page, picture, booklet)
 }
 
-/// What the report can show moving: each piece within its play.
+/// Motions that the page can show: each piece within its play, and the ways out that were found.
 fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     let turned = |v: [f64; 3]| stand(Vec3::from(v)).to_array();
     let pose = |[x, y, z, u, v, w]: [f64; 6]| {
@@ -136,7 +135,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     let shake = |(piece, swings): (PatchId, &Vec<[f64; 6]>)| ReportMove {
         piece: usize::from(piece),
         about: turned(design.kit.pieces[piece].centroid().to_array()),
-        // There and back, so that it comes through its place between any two.
+        // There and back: between any two poses the piece returns to its place.
         poses: swings.iter().flat_map(|swing| [pose(*swing), [0.0; 6]]).collect(),
     };
     let moves: Vec<ReportMove> = design
@@ -174,7 +173,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         .collect()
 }
 
-/// What the booklet says of loads.
+/// Loads as the booklet shows them.
 fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Borne> {
     let holding = &design.kit.holding;
     let bears = holding.summary()?;
@@ -199,7 +198,7 @@ fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Bor
     })
 }
 
-/// What failed, for the list of warnings.
+/// Turns a failed check into an entry of the list of warnings.
 fn failure(finding: &Finding, standing: &Standing) -> Warning {
     Warning {
         cause: Cause::Failed {
@@ -210,7 +209,7 @@ fn failure(finding: &Finding, standing: &Standing) -> Warning {
     }
 }
 
-/// The pieces as they stand, as finely as eyes see them.
+/// Upright pieces, simplified to a tolerance that the eye cannot see.
 fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
     let all = design
         .kit
@@ -229,7 +228,7 @@ fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
     design.kit.pieces.as_slice().par_iter().map(shown).collect()
 }
 
-/// What a person wants to know of the kit.
+/// Facts about the kit that people ask for.
 fn kit_facts(
     shown: &[TriMesh],
     settings: &Settings,
@@ -273,7 +272,7 @@ fn kit_facts(
     facts
 }
 
-/// What the kit bears.
+/// Facts about the loads that the kit can take.
 fn bearing_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
     let holding = &design.kit.holding;
     let Some(summary) = holding.summary() else {
@@ -288,7 +287,7 @@ fn bearing_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> 
     facts
 }
 
-/// Of what stands assembled.
+/// Size of the assembled kit, in words.
 fn size(shown: &[TriMesh]) -> String {
     let size = shown
         .iter()
@@ -297,14 +296,14 @@ fn size(shown: &[TriMesh]) -> String {
     format!("{:.1} × {:.1} × {:.1} mm high", size.x, size.y, size.z)
 }
 
-/// A file's name as a heading.
+/// Heading made from a file's name.
 fn title(name: &str) -> String {
     Path::new(name)
         .file_stem()
         .map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// What a person who builds the thing wants to know of it.
+/// Lines on the booklet's cover, for the person who builds the kit.
 fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
     vec![
         format!("{} pieces, {}", shown.len(), size(shown)),
@@ -312,7 +311,7 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
     ]
 }
 
-/// How exact a printer must be.
+/// Precision that the printer needs, in words.
 fn printed_within(design: &Design) -> String {
     match design.fit.within_mm {
         Some(mm) if mm > 0.0 => format!("± {mm:.2} mm"),
@@ -320,8 +319,7 @@ fn printed_within(design: &Design) -> String {
     }
 }
 
-/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is
-/// made to `stand`.
+/// Facts about the plan: its cost, and its weakest places, described for the model as it stands.
 fn plan_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
     let Kit {
         proof: p, holding, ..
@@ -349,10 +347,10 @@ fn plan_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
     [cost].into_iter().chain(weakest).chain(loose).collect()
 }
 
-/// What the report colours pieces by.
+/// Quantities that the page can colour pieces by.
 fn quantities(design: &Design) -> Vec<ReportQuantity> {
-    // The key is there to leave: how far it gets before unevenness stops it would drown what the others
-    // differ by.
+    // The key is meant to leave. Its travel, which only unevenness of the surfaces stops, would drown the
+    // differences between the others.
     let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
         let of_piece = |(id, p): (PatchId, &Option<Play>)| {
             p.filter(|_| id != design.kit.plan.key())
@@ -386,7 +384,7 @@ fn quantities(design: &Design) -> Vec<ReportQuantity> {
     quantities.into_iter().map(quantity).collect()
 }
 
-/// A piece's volume, and how each of its seams holds.
+/// Facts about a piece: its volume, cost, play, and the opening of each of its seams.
 fn piece_facts(design: &Design, piece: PatchId) -> Vec<(String, String)> {
     let mut facts = vec![
         (

@@ -1,15 +1,15 @@
-//! A segmentation as paint for slicers.
+//! Writes a segmentation as paint for slicers.
 
 use shellock::SegmentedSurface;
 use shellock_formats::write_painted_3mf;
 
-/// Colours that all slicers with paint can tell apart.
+/// Number of colours that all slicers with paint can distinguish.
 const N_COLORS: u32 = 16;
 
-/// A 3MF of the surface with its patches painted, and whether each patch has a colour of its own.
+/// Writes a 3MF of the surface with its patches painted; also returns true if each patch has its own colour.
 ///
-/// Patch k has colour k + 1 up to 16 patches. With more, patches share colours; those that touch do not,
-/// unless they must.
+/// Patch k has colour k + 1, up to 16 patches. With more, patches share colours, but patches that touch get
+/// different ones where possible.
 pub fn painted(name: &str, surface: &SegmentedSurface) -> (Vec<u8>, bool) {
     let is_distinct = surface.n_patches <= N_COLORS as usize;
     let color_of_patch = if is_distinct {
@@ -25,11 +25,11 @@ pub fn painted(name: &str, surface: &SegmentedSurface) -> (Vec<u8>, bool) {
     (write_painted_3mf(name, &surface.mesh, &colors), is_distinct)
 }
 
-/// For each patch, in order, the colour that fewest patches have of those that no neighbour has yet.
+/// Colours the patches in order: each gets the least-used colour, preferably one that no neighbour has.
 fn shared_colors(surface: &SegmentedSurface) -> Vec<u32> {
     let n = surface.n_patches;
     let mut touches = vec![vec![false; n]; n];
-    // Patches that share a point, since paint of one colour that meets in a point is hard to tell apart, too.
+    // Neighbours share a point: areas of one colour that meet in a point are hard to distinguish, too.
     let mut patches_of_point = vec![Vec::new(); surface.mesh.points.len()];
     for (triangle, patch) in surface.mesh.triangles.iter().zip(&surface.patch_of_face) {
         for &point in triangle {
@@ -64,7 +64,7 @@ mod tests {
     use shellock_formats::read_mesh;
     use shellock_geom::{TriMesh, Vec3};
 
-    /// A strip of quads, each a patch.
+    /// A strip of quads, each its own patch.
     fn strip(n_patches: usize) -> SegmentedSurface {
         let points = (0..2 * n_patches + 2)
             .map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0))

@@ -1,4 +1,4 @@
-//! Places in a maker's words, for somebody who stands in front of the model; figures are for machines.
+//! Places in words, for somebody who stands in front of the model; coordinates are for machines.
 
 use shellock::verify::words::PlaceWords;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -6,23 +6,24 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use crate::args::Axis;
 use crate::output::standing;
 
-/// A model as it stands.
+/// A model in upright position.
 pub struct Standing {
     up: Axis,
-    /// With z up; the front is towards −y, as [`shellock::segmentation::figures::front_of`] says, the left towards −x.
+    /// Bounding box with z up, mm. The front is towards −y, as [`shellock::segmentation::figures::front_of`]
+    /// says, the left towards −x.
     bounds: Aabb,
 }
 
 impl Standing {
-    /// Of a mesh that stands with `up` upwards.
+    /// Creates it for a mesh whose axis `up` points upwards.
     pub fn of(up: Axis, mesh: &TriMesh) -> Self {
         let bounds = Aabb::around(mesh.points.iter().map(|&p| standing(up, p)));
         Self { up, bounds }
     }
 
-    /// As in "left front, 42 mm up" or "underneath, in the middle".
+    /// Describes a place as in "left front, 42 mm up" or "underneath, in the middle".
     pub fn words(&self, at: [f64; 3]) -> String {
-        /// Nearer to the ground or to the top than this share of the height is there.
+        /// Share of the height within which a place counts as at the bottom or at the top.
         const END: f64 = 0.03;
         let from_corner = standing(self.up, Vec3::from(at)) - self.bounds.min;
         let share = from_corner / self.bounds.size().max(Vec3::splat(f64::MIN_POSITIVE));
@@ -54,9 +55,9 @@ impl PlaceWords for Standing {
         self.words(at)
     }
 
-    /// As in "to the left and up".
+    /// Describes a direction as in "to the left and up".
     fn way(&self, along: [f64; 3]) -> String {
-        /// Smaller components than this share of the length are not told: 22.5°.
+        /// Components below this share of the length are left out: 22.5°.
         const LEAST: f64 = 0.38;
         let d = standing(self.up, Vec3::from(along)).normalize_or_zero();
         let part = |x: f64, ways: [&'static str; 2]| (x.abs() > LEAST).then(|| ways[usize::from(x > 0.0)]);
@@ -88,12 +89,13 @@ mod tests {
         assert_eq!(z_up.words([45.0, 30.0, 99.0]), "on top, in the middle");
         assert_eq!(z_up.way([0.0, 0.0, -2.0]), "down");
         assert_eq!(z_up.way([-1.0, 0.1, 1.0]), "to the left and up");
-        // With y up, what has the greatest z stands in front.
+        // With y up, points with the greatest z are at the front.
         let y_up = Standing::of(Axis::Y, &mesh);
         assert_eq!(y_up.words([45.0, 30.0, 99.0]), "at the front, 30 mm up");
     }
 
-    /// [`front_of`] says where the front is; places are told, and pictures drawn, of models turned by [`standing`].
+    /// The front is defined by [`front_of`]; places are described, and pictures drawn, of models turned by
+    /// [`standing`].
     #[test]
     fn the_front_is_where_the_library_has_it() {
         for up in [Axis::X, Axis::Y, Axis::Z] {

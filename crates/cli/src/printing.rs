@@ -1,4 +1,4 @@
-//! A kit on the plates of a printer: files, figures, and what does not fit.
+//! Lays a kit on the plates of a printer: files, figures, and pieces that do not fit.
 
 use rayon::prelude::*;
 use shellock::{Cause, PatchId, Warning};
@@ -14,26 +14,27 @@ use shellock_print::{Printer, Process};
 use shellock_render::palette;
 use shellock_render::stills::{Camera, Painted, render};
 
-/// A face is part of the outer skin where its middle is so near to the model's surface, mm.
+/// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
 const SKIN_MM: f64 = 0.05;
 
-/// Colour of a plate in pictures.
+/// Colour of the plate in pictures.
 const BED: [u8; 3] = [226, 228, 232];
 
-/// A kit, laid on plates.
+/// A kit laid on plates.
 pub struct Printing {
     printer: Printer,
     plates: Plates,
-    /// By the closed forms: all plates, and the whole model as people print it; `None` where it cannot be laid.
+    /// Cost of all plates, and of the whole model as people print it, by closed forms; `None` if it cannot be
+    /// laid.
     cost: Cost,
     whole: Option<Cost>,
-    /// What the pieces weigh without supports, g.
+    /// Mass of the pieces without supports, g.
     grams: f64,
 }
 
 impl Printing {
-    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen;
-    /// `solid` is the model.
+    /// Lays `pieces` on plates of `printer`. Faces of theirs on `surface` are the visible skin; `solid` is
+    /// the model.
     pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
         let skin = TriangleBvh::new(surface);
         let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
@@ -58,17 +59,17 @@ impl Printing {
         }
     }
 
-    /// What all plates take by closed forms, and the whole model as people print it.
+    /// Cost of all plates by closed forms, and of the whole model as people print it.
     pub fn costs(&self) -> (Cost, Option<Cost>) {
         (self.cost, self.whole)
     }
 
-    /// What the pieces weigh without supports, g.
+    /// Mass of the pieces without supports, g.
     pub fn grams(&self) -> f64 {
         self.grams
     }
 
-    /// Says which pieces the printer cannot make.
+    /// Warns of pieces that are too large for the printer; `None` if all fit.
     pub fn warnings(&self) -> Option<Warning> {
         let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| i.into()).collect();
         (!pieces.is_empty()).then(|| Warning {
@@ -80,7 +81,7 @@ impl Printing {
         })
     }
 
-    /// In one line for people.
+    /// Describes the plates in one line for people.
     pub fn words(&self) -> String {
         let n = self.plates.n_plates;
         let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
@@ -99,7 +100,8 @@ impl Printing {
         )
     }
 
-    /// "about 13 h 50 min and 104 g on this printer with supports; the whole model …".
+    /// Describes the cost, as in "about 13 h 50 min and 104 g on this printer with supports; the whole model
+    /// …".
     fn cost_words(&self) -> String {
         let process = self.printer.process;
         let supports = if process == Process::Sls {
@@ -118,12 +120,12 @@ impl Printing {
         }
     }
 
-    /// What it is printed on.
+    /// Printer that the kit is laid out for.
     pub fn printer(&self) -> &Printer {
         &self.printer
     }
 
-    /// In figures, for the page.
+    /// Lists the figures of the plates for the page.
     pub fn figures(&self) -> Vec<(String, String)> {
         let n = self.plates.n_plates;
         let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
@@ -143,7 +145,7 @@ impl Printing {
         figures
     }
 
-    /// Each plate from above, as PNG.
+    /// Renders each plate from above, as PNG.
     pub fn pictures(&self, pieces: &[TriMesh]) -> Vec<Vec<u8>> {
         (0..self.plates.n_plates)
             .into_par_iter()
@@ -183,12 +185,12 @@ impl Printing {
         render(&scene, &Camera::along(-Vec3::Z, Vec3::Y), WIDTH, height).png()
     }
 
-    /// For plan.json.
+    /// Entry on printing in plan.json.
     pub fn entry(&self) -> PrintingEntry {
         PrintingEntry::of(&self.printer, &self.plates, self.cost, self.whole)
     }
 
-    /// All plates side by side, and each alone where there are several.
+    /// 3MF files: all plates side by side, and each plate alone if there are several.
     pub fn files(&self, pieces: &[TriMesh]) -> Vec<(String, Vec<u8>)> {
         let names: Vec<String> = (1..=pieces.len())
             .map(|number| format!("piece {number}"))
@@ -231,7 +233,7 @@ impl Printing {
     }
 }
 
-/// A piece as it lies, coarse enough for a picture.
+/// Piece in its pose on the plate, coarse enough for a picture.
 fn as_laid(laid: &Laid, piece: &TriMesh) -> TriMesh {
     const SEEN_MM: f64 = 0.15;
     let coarse = decimate(piece.clone(), &vec![SEEN_MM; piece.points.len()]);
@@ -241,7 +243,7 @@ fn as_laid(laid: &Laid, piece: &TriMesh) -> TriMesh {
     }
 }
 
-/// A piece, with the faces that lie on the model's surface told apart.
+/// Marks the faces of a piece that lie on the model's surface.
 fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
     let is_outer = |f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
     Printable {

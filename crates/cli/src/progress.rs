@@ -1,4 +1,4 @@
-//! Progress on standard error.
+//! Shows progress on standard error.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -11,19 +11,20 @@ use shellock::context::Progress;
 use crate::course::{Course, Stand};
 use crate::stopwatch::{StageTime, Stopwatch};
 
-/// How progress is shown.
+/// Form in which progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// A bar on a terminal, plain lines elsewhere.
     ForPeople,
-    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, of a kit's also `number`, `n_stages`
-    /// and `seconds_left` (null at first); `{"event": "note", "text", "seconds"}`; at last `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
+    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, for stages of a kit also
+    /// `number`, `n_stages` and `seconds_left` (null at first); `{"event": "note", "text", "seconds"}`; at
+    /// the end `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
     Events,
-    /// Not at all.
+    /// No progress is shown.
     Nothing,
 }
 
-/// Shows stages as they come.
+/// Shows stages as they begin.
 pub struct Display {
     bar: Mutex<Option<ProgressBar>>,
     is_terminal: bool,
@@ -34,7 +35,7 @@ pub struct Display {
 }
 
 impl Display {
-    /// A display that has shown nothing yet.
+    /// Creates a display that has shown nothing yet.
     pub fn new(shown: Shown) -> Self {
         Self {
             bar: Mutex::new(None),
@@ -46,7 +47,7 @@ impl Display {
         }
     }
 
-    /// The same for the making of a kit, whose stages are counted.
+    /// Creates a display for a kit, whose stages are counted.
     pub fn of_kit(shown: Shown) -> Self {
         Self {
             course: Some(Mutex::new(Course::new())),
@@ -63,12 +64,12 @@ impl Display {
         course.begin(name, Instant::now())
     }
 
-    /// What each stage took until now.
+    /// Time that each stage has taken so far.
     pub fn stages(&self) -> Vec<StageTime> {
         self.watch.stages()
     }
 
-    /// What the library reports.
+    /// Shows a report of the library.
     pub fn show(&self, progress: Progress<'_>) {
         if let Progress::Stage { name, .. } = progress {
             self.watch.begin(name);
@@ -122,13 +123,13 @@ impl Display {
         }
     }
 
-    /// A stage's name with its number, where it has one.
+    /// Name of a stage with its number, if it has one.
     fn named(&self, name: &str, words: impl Fn(&Stand, &str) -> String) -> String {
         self.stand(name)
             .map_or_else(|| name.to_owned(), |stand| words(&stand, name))
     }
 
-    /// Takes the last bar away, and says what the stages took to machines.
+    /// Removes the last bar; with events, also prints the time that the stages took.
     pub fn finish(&self) {
         if self.shown == Shown::Events {
             let seconds = self.since.elapsed().as_secs_f64();
@@ -143,18 +144,18 @@ impl Display {
     }
 }
 
-/// When the whole job is to be done.
+/// Time by which the whole job should be done.
 pub struct Deadline(Option<Instant>);
 
 impl Deadline {
-    /// So many seconds after `since`; never for 0.
+    /// Deadline `seconds` after `since`; none if `seconds` is 0.
     pub fn new(seconds: f64, since: Instant) -> Self {
         let time = Duration::try_from_secs_f64(seconds).ok();
         let time = time.filter(|time| !time.is_zero());
         Self(time.and_then(|time| since.checked_add(time)))
     }
 
-    /// Until then; below 0 when it is past.
+    /// Time left, s: negative after the deadline, infinite if there is none.
     pub fn seconds_left(&self) -> f64 {
         let Some(at) = self.0 else {
             return f64::INFINITY;
@@ -165,15 +166,15 @@ impl Deadline {
     }
 }
 
-/// How long the current search for a plan has been going on.
+/// Limits the time of the current search for a plan.
 pub struct PlanClock {
     since: Mutex<Instant>,
     limit: Duration,
 }
 
 impl PlanClock {
-    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time, and some to
-    /// find any plan.
+    /// Clock for searches that were allowed the work of `plan_time_s`. They get twice that time, and 10 s
+    /// more to find a first plan.
     pub fn new(plan_time_s: f64) -> Self {
         const GRACE_S: f64 = 10.0;
         let limit = Duration::try_from_secs_f64(2.0 * plan_time_s + GRACE_S).unwrap_or(Duration::MAX);
@@ -183,14 +184,14 @@ impl PlanClock {
         }
     }
 
-    /// Every stage starts the clock anew, so each search has its own time.
+    /// Restarts the clock at every stage, so that each search has its own time.
     pub fn see(&self, progress: &Progress<'_>) {
         if let Progress::Stage { .. } = progress {
             *self.since.lock().expect("no holder of this lock panics") = Instant::now();
         }
     }
 
-    /// Whether the stage has gone on for longer than planning may.
+    /// Returns true if the stage has taken longer than planning may.
     pub fn is_up(&self) -> bool {
         self.since
             .lock()

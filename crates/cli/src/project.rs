@@ -1,4 +1,5 @@
-//! A project file: a model by its hash, and all that was chosen for it. `build` makes it into the same kit anywhere.
+//! Project file: a model by its hash, and all that was chosen for it. `build` makes the same kit of it
+//! anywhere.
 //!
 //! ```toml
 //! size = "150mm"
@@ -10,8 +11,8 @@
 //! sha256 = "9f86d081884c7d65…"
 //! ```
 //!
-//! It is a configuration file (`config`) that names its model, too: options have the names that they have on the command
-//! line, and printers of one's own may follow.
+//! It is a configuration file (`config`) that names its model, too. Options have their names on the command
+//! line; the user's own printers may follow.
 
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
@@ -19,27 +20,27 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 use toml_edit::{DocumentMut, Item, Table, Value, value};
 
-/// How the name of a project file ends.
+/// Ending of a project file's name.
 pub const SUFFIX: &str = ".shellock.toml";
 
-/// Where a project's model is.
+/// Reference to a project's model.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOf {
-    /// Its file, beside the project file.
+    /// Name of the model's file, beside the project file.
     pub file: String,
-    /// Of the file's bytes.
+    /// SHA-256 of the file's bytes.
     pub sha256: String,
 }
 
 impl ModelOf {
-    /// The file of a project in `folder`; fails where its name leads elsewhere.
+    /// Path of the model's file for a project in `folder`; fails if the name leads out of the folder.
     pub fn path(&self, folder: &Path) -> Result<PathBuf, String> {
         beside(folder, &self.file)
     }
 }
 
-/// `name` in `folder`, where it is a plain name.
+/// Path of `name` in `folder`; fails unless `name` is a plain file name.
 pub fn beside(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let mut parts = Path::new(name).components();
     match (parts.next(), parts.next()) {
@@ -50,34 +51,34 @@ pub fn beside(folder: &Path, name: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Whether `path` is named as project files are.
+/// Returns true if `path` has the ending of project files.
 pub fn is_project(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name.to_string_lossy().ends_with(SUFFIX))
 }
 
-/// What is chosen of one option.
+/// Choice for one option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// A flag is set.
+    /// The flag is set.
     On,
-    /// It has this value.
+    /// The option has this value.
     Text(String),
-    /// It is given several times.
+    /// The option is given several times.
     Many(Vec<String>),
 }
 
-/// A project as it is written.
+/// Contents of a project file that is to be written.
 pub struct Project<'a> {
     pub model: Option<&'a ModelOf>,
-    /// Options by their long names.
+    /// Chosen options by their long names.
     pub choices: &'a [(String, Choice)],
-    /// `[printers]` of the configuration file that it began with, as it stands there.
+    /// `[printers]` of the configuration file that the project began with, unchanged.
     pub printers: Option<&'a Item>,
 }
 
 impl Project<'_> {
-    /// The file's text.
+    /// Text of the project file.
     pub fn to_toml(&self) -> String {
         let mut file = DocumentMut::new();
         for (name, choice) in self.choices {

@@ -1,9 +1,9 @@
-//! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
+//! `report`: savings of a kit over the solid model, in the terms of the paper's Table 1.
 //!
-//! Time and material are PrusaSlicer's own estimates where it is installed, else closed forms, with supports and
-//! the same settings for both. Where PrusaSlicer is installed and gives no estimate, `note` says why. Pieces are laid on
-//! plates anew for either process; the whole model is printed as people print it (filament at 15 % infill, resin
-//! hollowed) in the pose that takes the least.
+//! Time and material are PrusaSlicer's own estimates if it is installed, else closed forms; both include
+//! supports and use the same settings for kit and model. If PrusaSlicer is installed but gives no estimate,
+//! `note` says why. Pieces are laid on plates anew for each process. The whole model is printed as people
+//! print it (filament at 15 % infill, resin hollowed), in the cheapest pose.
 
 use std::fs;
 use std::io::Read;
@@ -23,28 +23,28 @@ use crate::interrupt::Writing;
 use crate::printing::Printing;
 use crate::stages::{Kit, model_of, pieces_of, plan_of, write};
 
-/// The file's name within a kit.
+/// Name of the file within a kit.
 const SAVINGS: &str = "savings.json";
-/// The slicer's program.
+/// Name of the slicer's program.
 const SLICER: &str = "prusa-slicer";
-/// Longest `config.ini` that is read of an archive for a resin printer, bytes. It is a list of short entries; the bound is
-/// against archives that are broken.
+/// Size limit of the `config.ini` read from a resin printer's archive, bytes. It is a list of short entries;
+/// the limit guards against broken archives.
 const MOST_CONFIG_BYTES: u64 = 1 << 20;
 
-/// Settings of both technologies, where they are not the slicer's defaults, on a bed that holds everything. The
-/// display of the resin printer is coarse: its pixels cost time here and change little.
+/// Settings for both technologies that differ from the slicer's defaults, on a bed that holds everything. The
+/// resin printer's display is coarse: its pixels cost time here and change little.
 const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
     supports_enable = 1\npad_enable = 1\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
 const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\nperimeters = 2\n\
     fill_density = 15%\n";
-/// The whole model of resin.
+/// Further settings for the whole model in resin.
 const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
-/// Instead of 15 %.
+/// Further settings for a filled model: 100 % infill instead of 15 %.
 const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
-/// `shellock report`.
+/// Runs `shellock report` and returns the exit code.
 pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<u8, Failure> {
     let plan = plan_of(kit)?;
     let Kit { pieces, .. } = pieces_of(kit, &plan)?;
@@ -119,15 +119,15 @@ fn print(told: &Value) {
 
 /// Costs of a kit and of its model.
 struct Costs {
-    /// Who says so.
+    /// Name of the source of the figures.
     by: &'static str,
-    /// All plates.
+    /// Cost of all plates.
     pieces: Cost,
-    /// The whole model as people print it.
+    /// Cost of the whole model as people print it.
     whole: Cost,
-    /// The whole model, filled, where that is another.
+    /// Cost of the whole model with 100 % infill, for filament.
     filled: Option<Cost>,
-    /// Why some or all of it is not the slicer's estimate, though the slicer is installed.
+    /// Reason why figures of the slicer are missing although it is installed.
     note: Option<String>,
 }
 
@@ -143,7 +143,7 @@ impl Costs {
         }
     }
 
-    /// The entry of `savings.json`.
+    /// Entry of `savings.json` for one process.
     fn entry(&self, process: Process) -> Value {
         let Self { pieces, whole, .. } = self;
         let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
@@ -155,10 +155,10 @@ impl Costs {
     }
 }
 
-/// Why there is no estimate of the slicer.
+/// Reason why there is no estimate from the slicer.
 #[derive(Debug)]
 enum NoEstimate {
-    /// The slicer refuses something, or its answer cannot be read.
+    /// The slicer refuses the model, or its answer cannot be read.
     Because(String),
     /// A file could not be written.
     Failed(Failure),
@@ -170,15 +170,15 @@ impl From<Failure> for NoEstimate {
     }
 }
 
-/// PrusaSlicer, and a folder for its files.
+/// PrusaSlicer, and a temporary folder for its files.
 struct Slicer {
     folder: tempfile::TempDir,
-    /// Until the folder is gone.
+    /// Keeps the program running until the folder is deleted.
     _writing: Writing,
 }
 
 impl Slicer {
-    /// The slicer, where it is installed.
+    /// Returns the slicer, or `None` if it is not installed.
     fn find() -> Result<Option<Self>, Failure> {
         let runs = Command::new(SLICER)
             .arg("--help")
@@ -193,7 +193,7 @@ impl Slicer {
         Ok(Some(Self { folder, _writing }))
     }
 
-    /// All plates among `files`, and the solid.
+    /// Estimates the cost of all plates among `files`, and of the solid model.
     fn costs(
         &self,
         printer: &Printer,
@@ -236,7 +236,8 @@ impl Slicer {
         })
     }
 
-    /// Cost of the 3MF file `bytes`, which people know as `name`; `more` settings stand last.
+    /// Estimates the cost of the 3MF file `bytes`, called `name` in messages; `more` settings override the
+    /// others.
     fn cost_of(&self, printer: &Printer, name: &str, bytes: &[u8], more: &str) -> Result<Cost, NoEstimate> {
         let [model, settings, out] =
             ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
@@ -278,7 +279,7 @@ impl Slicer {
     }
 }
 
-/// Time and material that the slicer wrote into its result, the file `out`; or why they cannot be read.
+/// Reads time and material from the slicer's result, the file `out`; fails with the reason.
 fn estimate(out: &Path, printer: &Printer) -> Result<Cost, String> {
     let (seconds, cm3) = match printer.process {
         Process::Fdm => {
@@ -293,7 +294,7 @@ fn estimate(out: &Path, printer: &Printer) -> Result<Cost, String> {
     })
 }
 
-/// Seconds and cm³ in the comments of G-code.
+/// Reads seconds and cm³ from the comments of G-code.
 fn filament_estimate(code: &str) -> Result<(f64, f64), String> {
     let value = |name: &str| {
         let line = code
@@ -309,7 +310,7 @@ fn filament_estimate(code: &str) -> Result<(f64, f64), String> {
     Ok((seconds, number(value("filament used [cm3]")?)?))
 }
 
-/// Seconds and cm³ in the `config.ini` of an archive for resin printers.
+/// Reads seconds and cm³ from the `config.ini` of a resin printer's archive.
 fn resin_estimate(config: &str) -> Result<(f64, f64), String> {
     let value = |name: &str| {
         let entries = config.lines().filter_map(|line| line.split_once('='));
@@ -326,7 +327,7 @@ fn number(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("\"{}\" is no number", text.trim()))
 }
 
-/// The `config.ini` of the archive `out`.
+/// Reads the `config.ini` of the archive `out`.
 fn config_of(out: &Path) -> Result<String, String> {
     const CONFIG: &str = "config.ini";
     let file = fs::File::open(out).map_err(|e| e.to_string())?;
@@ -340,7 +341,7 @@ fn config_of(out: &Path) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// "1d 2h 3m 4s" in seconds; `None` where it is anything else.
+/// Parses a time such as "1d 2h 3m 4s" into seconds; `None` for any other text.
 fn seconds_in(text: &str) -> Option<f64> {
     let seconds = |word: &str| {
         let (number, unit) = word.split_at_checked(word.len().checked_sub(1)?)?;
@@ -374,7 +375,7 @@ mod tests {
         }
     }
 
-    /// Reads a slicer's answer with these bytes.
+    /// Reads seconds and cm³ from a slicer's result with these bytes.
     fn read_estimate(printer: &Printer, bytes: &[u8]) -> Result<(f64, f64), String> {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("job.out");

@@ -1,4 +1,4 @@
-//! What of a model's shape stands in the way of a kit: a cavity that is there already, parts that are too thin, slits.
+//! Obstacles to a kit in a model's shape: an existing cavity, parts that are too thin, slits.
 
 use shellock::strength::StrengthParams;
 use shellock::verify::limits::LEAST_SLOT_MM;
@@ -12,16 +12,16 @@ use crate::failure::Failure;
 use crate::input::Model;
 use crate::inspect::thin_warnings;
 
-/// Where it is asked for, smaller cavities are filled than those that make a model hollow: down to this share of the
-/// body.
+/// Least share of the body's volume of a cavity that `--fill` fills. It is lower than the share at which a
+/// model counts as hollow.
 const LEAST_FILLED: f64 = 0.02;
-/// A wall that is thicker than this many walls of a kit has room for two of them and connectors between.
+/// Wall thickness, in walls of a kit, above which there is room for two walls and connectors between them.
 const ROOM_WALLS: f64 = 4.0;
-/// Openings and slits that are told one by one.
+/// Number of openings and slits that are listed one by one.
 const N_TOLD: usize = 3;
 
-/// Sees to a model that is hollow already: fills it where that is asked for, else refuses it, or notes that it stays
-/// as it is where its wall is thick enough to be made hollow itself.
+/// Handles a model that is already hollow. Fills it if the options ask for that. Otherwise notes that it
+/// stays as it is if its wall is thick enough to be made hollow itself, and refuses it if not.
 pub fn settle_hollow(model: &mut Model, options: &Options) -> Result<(), Failure> {
     let least_share = if options.fill { LEAST_FILLED } else { LEAST_SHARE };
     let Some(hollow) = find_hollow(&model.solid, least_share) else {
@@ -55,9 +55,10 @@ pub fn settle_hollow(model: &mut Model, options: &Options) -> Result<(), Failure
     )))
 }
 
-/// The body that a kit with these repairs was made from: filled again, where it was filled then.
+/// Fills the body again if the kit with these repairs was made from a filled one; else returns it unchanged.
 ///
-/// Refuses a body that cannot be filled again, since a verdict on the hollow one would be of another shape.
+/// Fails if no cavity is found or it cannot be filled: a verdict on the hollow body would be on another
+/// shape.
 pub fn filled_again(solid: Solid, repairs: &[&str]) -> Result<Solid, String> {
     if !repairs.contains(&RepairKind::Drained { volume: 0.0 }.code()) {
         return Ok(solid);
@@ -72,7 +73,7 @@ pub fn filled_again(solid: Solid, repairs: &[&str]) -> Result<Solid, String> {
         .map_err(|e| e.to_string())
 }
 
-/// Makes `model` the filled body, with a word on it.
+/// Replaces the model's body by the filled one and adds a note.
 fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
     let source = &filled.source_face;
     model.file_face = source.iter().map(|&f| model.file_face[f as usize]).collect();
@@ -93,7 +94,7 @@ fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
         )),
         volume(hollow.cavity_mm3)
     ));
-    // Repairs are told in the file's own units and coordinates.
+    // Repairs are reported in the file's own units and coordinates.
     let scale = model.transform[0];
     let shift = Vec3::new(model.transform[3], model.transform[7], model.transform[11]);
     model.repairs.push(Repair {
@@ -105,14 +106,14 @@ fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
     });
 }
 
-/// What is worth a warning before a kit is made: thin parts and slits.
+/// Warnings before a kit is made: thin parts and slits.
 pub fn shape_warnings(model: &Model, options: &Options) -> Vec<String> {
     let mut warnings = thin_warnings(model, options);
     warnings.extend(slit_warning(model, options));
     warnings
 }
 
-/// Slits that are narrower than what a seam needs, or than printers leave open.
+/// Warns of slits that are narrower than a seam needs, or than printers leave open.
 fn slit_warning(model: &Model, options: &Options) -> Option<String> {
     let tolerance_mm = options
         .chosen_printer()
@@ -140,7 +141,7 @@ fn slit_warning(model: &Model, options: &Options) -> Option<String> {
     ))
 }
 
-/// The wall that a kit has at least, mm.
+/// Least wall thickness of the kit, mm.
 pub fn wall_mm(options: &Options) -> f64 {
     match options.thickness {
         Thickness::Mm(mm) => mm,
@@ -148,7 +149,7 @@ pub fn wall_mm(options: &Options) -> f64 {
     }
 }
 
-/// The openings, as what leads somewhere.
+/// Describes the openings as the subject of "leads into".
 fn leads(openings: &[Opening]) -> String {
     let told = places(openings, |o| {
         format!("near {} ({:.1} mm wide)", place(o.at), o.width_mm)
@@ -159,7 +160,7 @@ fn leads(openings: &[Opening]) -> String {
     }
 }
 
-/// The first of `all` in words, and how many more there are.
+/// Lists the first few places in words, and the number of those left out.
 fn places<T>(all: &[T], told: impl Fn(&T) -> String) -> String {
     let first: Vec<String> = all.iter().take(N_TOLD).map(told).collect();
     let rest = match all.len().saturating_sub(N_TOLD) {
@@ -175,7 +176,7 @@ fn place(at: Vec3) -> String {
     format!("({x:.1}, {y:.1}, {z:.1}) mm")
 }
 
-/// A volume in cm³, or in mm³ where it is small.
+/// Writes a volume in cm³, or in mm³ if it is below 1 cm³.
 fn volume(mm3: f64) -> String {
     if mm3 >= 1000.0 {
         format!("{:.1} cm³", mm3 / 1000.0)
@@ -243,11 +244,11 @@ mod tests {
             "{:?}",
             model.notes
         );
-        // What was filled once is filled again the same way.
+        // A model that was filled once is filled again in the same way.
         let kinds = [repair.kind.code()];
         assert!(filled_again(before.clone(), &kinds).as_ref() == Ok(&model.solid));
         assert!(filled_again(before.clone(), &[]).as_ref() == Ok(&before));
-        // Nothing is judged in place of what was filled.
+        // A body that cannot be filled again is refused.
         assert!(filled_again(model.solid, &kinds).is_err());
     }
 }

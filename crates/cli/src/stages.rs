@@ -1,4 +1,4 @@
-//! Each stage alone, from what an earlier one wrote.
+//! Single stages, each starting from the files of an earlier one.
 
 use std::fmt;
 use std::fs;
@@ -32,7 +32,7 @@ use crate::shape::filled_again;
 use crate::shares::largest_shares;
 use crate::told::{print_input_warnings, print_verdict, print_warnings, quality, weakest};
 
-/// Writes one file: whole or not at all.
+/// Writes one file, whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let _writing = Writing::begin();
     let parent = path
@@ -41,7 +41,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".shellock-");
-    // Temporary files are for their owner alone; this one stays, for whom the user lets read files.
+    // Temporary files are readable by their owner only. This one stays, so it gets the user's usual
+    // permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let temporary = builder.tempfile_in(parent).map_err(Failure::unwritable(path))?;
@@ -60,7 +61,7 @@ fn extension(path: &Path) -> String {
         .map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase())
 }
 
-/// `shellock segment`.
+/// Runs `shellock segment` and returns the exit code.
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
     checked(options)?;
     let kind = extension(out);
@@ -110,7 +111,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     Ok(0)
 }
 
-/// The surface of `model` as it is divided.
+/// Divides the surface of `model` as the options ask.
 pub fn divided(
     session: &Session,
     ctx: &Ctx,
@@ -123,7 +124,7 @@ pub fn divided(
     Ok(surface.map_err(DesignError::from)?)
 }
 
-/// For each face of the file, the patch that has most of its area; faces that were dropped are of the first.
+/// Patch with the largest share of each face of the file, from 1; dropped faces get the first patch.
 pub fn labels_of_file(model: &input::Model, surface: &SegmentedSurface) -> Vec<u32> {
     labels_of_faces(model.n_file_faces, &model.file_face, surface)
 }
@@ -139,7 +140,7 @@ fn labels_of_faces(n_file_faces: usize, file_face: &[u32], surface: &SegmentedSu
     most.into_iter().map(|label| label.unwrap_or(dropped)).collect()
 }
 
-/// `shellock plan`.
+/// Runs `shellock plan` and returns the exit code.
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
     let model = input::simple_model(session, file, options)?;
     let params = fitted(session, &checked(options)?, options, &model)?;
@@ -206,7 +207,7 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     Ok(0)
 }
 
-/// `shellock verify`.
+/// Runs `shellock verify` and returns the exit code: 0 if every check passes, else 1.
 pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8, Failure> {
     let plan = plan_of(kit)?;
     let Kit { files, pieces, order } = pieces_of(kit, &plan)?;
@@ -253,8 +254,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
-/// Files besides the pieces, as the earlier certificate names and hashes them, if there is one: what they
-/// hold is not verified again.
+/// Files besides the pieces, with their hashes, as the earlier certificate lists them; empty if there is
+/// none. Their contents are not verified again.
 fn certified_files(kit: &Path) -> Vec<OtherFile> {
     let earlier = read(&kit.join(CERTIFICATE))
         .ok()
@@ -264,19 +265,19 @@ fn certified_files(kit: &Path) -> Vec<OtherFile> {
         .unwrap_or_default()
 }
 
-/// What the kit's plan.json says.
+/// Reads the kit's plan.json.
 pub fn plan_of(kit: &Path) -> Result<PlanFile, Failure> {
     PlanFile::read(&read(&kit.join(PLAN))?).map_err(broken(kit))
 }
 
-/// Says which kit's plan.json is to blame.
+/// Returns a function that turns a problem into an error that names the kit's plan.json.
 pub fn broken<E: fmt::Display>(kit: &Path) -> impl Fn(E) -> Failure {
     let path = kit.join(PLAN);
     move |what| Failure::Wrong(format!("{}: {what}", path.display()))
 }
 
-/// The solid that a kit was made from, in assembly space: that in the file `model`, or in the one that the
-/// plan names.
+/// Reads the solid that a kit was made from, in assembly space, from the file `model` or else from the one
+/// that the plan names.
 pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Solid, Failure> {
     let Some(input) = &plan.input else {
         return Err(broken(kit)(
@@ -296,7 +297,8 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
     };
     let (loaded, _) = load_selected(&model_path, &selection)?;
     let repairs: Vec<&str> = input.repairs.iter().map(|r| r.kind.as_str()).collect();
-    // A kit that was made has an answer to what is asked of other files.
+    // The finished kit already answers the question that other files raise: its repairs say what the body
+    // means.
     let inside_out = if repairs.contains(&RepairKind::CutOut { volume: 0.0 }.code()) {
         InsideOut::Cut
     } else {
@@ -316,14 +318,14 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
     filled_again(solid, &repairs).map_err(broken(kit))
 }
 
-/// What a plan file names.
+/// Pieces and order that a plan file names.
 pub struct Kit {
     pub files: Vec<PieceFile>,
     pub pieces: IdVec<PatchId, TriMesh>,
     pub order: InstallationPlan,
 }
 
-/// The files, their meshes and the order that a plan file names.
+/// Reads the piece files that a plan names, their meshes, and the order.
 pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Kit, Failure> {
     let order = plan.order().map_err(broken(kit))?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
@@ -354,7 +356,7 @@ pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Kit, Failure> {
     })
 }
 
-/// Whether both are the same name in the same folder.
+/// Returns true if both paths have the same name in the same folder.
 fn same_file(a: &Path, b: &Path) -> bool {
     let folder = |p: &Path| match p.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => fs::canonicalize(folder).ok(),
@@ -363,7 +365,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     a.file_name() == b.file_name() && folder(a) == folder(b)
 }
 
-/// `shellock figure`.
+/// Runs `shellock figure` and returns the exit code.
 pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Result<u8, Failure> {
     let (solid, limbs) = input::shellock_figure(name, size_mm)?;
     if labels.is_some() && limbs.iter().all(|limb| *limb == 0) {
@@ -403,7 +405,7 @@ pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Re
 mod tests {
     use super::*;
 
-    /// Triangles apart from each other, each of a patch, of a triangle of the model and of an area.
+    /// Separate triangles, each given as its patch, its triangle of the model, and its area.
     fn surface(parts: &[(u32, u32, f64)]) -> SegmentedSurface {
         let mut mesh = TriMesh::default();
         for (i, (_, _, area)) in parts.iter().enumerate() {
@@ -425,9 +427,9 @@ mod tests {
 
     #[test]
     fn a_face_of_the_file_has_the_patch_with_most_of_its_area_over_all_its_triangles() {
-        // A polygon of triangles 0 to 2: 5 of its area are of patch 0, 3 + 3 of patch 1.
+        // A polygon of triangles 0 to 2: area 5 belongs to patch 0, 3 + 3 to patch 1.
         let polygon = [(0, 0, 5.0), (1, 1, 3.0), (1, 2, 3.0)];
-        // A triangle that a seam cuts: the larger part decides, and so do two parts together.
+        // A triangle that a seam cuts: the larger part decides, or two parts together.
         let cut = [(2, 3, 1.0), (0, 3, 2.0), (2, 3, 1.5)];
         let surface = surface(&[&polygon[..], &cut].concat());
         let labels = labels_of_faces(3, &[0, 0, 0, 1], &surface);

@@ -1,4 +1,4 @@
-//! What the stages of a job took, on the wall's clock and of the processors.
+//! Time that the stages of a job take: wall-clock time and processor time.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -6,31 +6,31 @@ use std::time::{Duration, Instant};
 use cpu_time::ProcessTime;
 use serde::Serialize;
 
-/// What one stage took, all its rounds together.
+/// Time of one stage, summed over all its rounds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageTime {
-    /// What a person reads.
+    /// Name of the stage, for people.
     pub name: String,
-    /// On the wall's clock, s. Of stages side by side the former has it until the latter begins.
+    /// Wall-clock time, s. Of stages that overlap, the earlier one counts until the later one begins.
     pub seconds: f64,
-    /// Of all processors, s.
+    /// Processor time of all threads, s.
     pub cpu_seconds: f64,
-    /// How often it began.
+    /// Number of times that the stage began.
     pub rounds: usize,
 }
 
-/// Times stages from the moment it is made.
+/// Times stages from the moment of its creation.
 pub struct Stopwatch(Mutex<State>);
 
 struct State {
     stages: Vec<StageTime>,
-    /// The place of the stage that runs.
+    /// Index of the running stage.
     current: usize,
     since: (Instant, ProcessTime),
 }
 
 impl Stopwatch {
-    /// Begins with a stage of its own for what comes before the first.
+    /// Starts with a stage of its own, "begin", for the time before the first stage.
     pub fn new() -> Self {
         let mut state = State {
             stages: Vec::new(),
@@ -41,14 +41,14 @@ impl Stopwatch {
         Self(Mutex::new(state))
     }
 
-    /// A stage begins.
+    /// Begins a stage, and ends the current one.
     pub fn begin(&self, name: &str) {
         let mut state = self.0.lock().expect("no holder of this lock panics");
         state.close();
         state.begin(name);
     }
 
-    /// What all took until now, in the order in which they first began.
+    /// Times of all stages so far, in the order in which they first began.
     pub fn stages(&self) -> Vec<StageTime> {
         let mut state = self.0.lock().expect("no holder of this lock panics");
         state.close();
@@ -57,7 +57,7 @@ impl Stopwatch {
 }
 
 impl State {
-    /// Adds what went by to the current stage.
+    /// Adds the elapsed time to the current stage.
     fn close(&mut self) {
         let (wall, cpu) = (self.since.0.elapsed(), self.since.1.elapsed());
         let stage = &mut self.stages[self.current];

@@ -1,4 +1,4 @@
-//! `test`: what a punch and a fall do to a finished kit.
+//! `test`: simulates a punch and a fall of a finished kit.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ use crate::output::PLAN;
 use crate::progress::Display;
 use crate::stages::{broken, plan_of, write};
 
-/// The material of that name.
+/// Finds the material preset of that name, in any case.
 pub fn material(name: &str) -> Result<Material, String> {
     let found = Material::PRESETS
         .into_iter()
@@ -34,7 +34,7 @@ pub fn material(name: &str) -> Result<Material, String> {
     found.ok_or_else(|| no_such("material", name, &Material::PRESETS.map(|(preset, _)| preset)))
 }
 
-/// `shellock test`.
+/// Runs `shellock test` and returns the exit code: 0 if the kit holds, else 1.
 pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
     if !kit.join(PLAN).exists() {
         return Err(Failure::Wrong(format!(
@@ -80,7 +80,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     Ok(code)
 }
 
-/// Whether the plan's directions are some, and its kit is complete.
+/// Checks that the plan's directions are valid and that all of the kit's piece files exist.
 fn check_kit(kit: &Path, plan: &PlanFile) -> Result<(), Failure> {
     plan.check_directions().map_err(broken(kit))?;
     let mut files = plan.pieces.iter().filter_map(|piece| piece.file.as_ref());
@@ -92,7 +92,7 @@ fn check_kit(kit: &Path, plan: &PlanFile) -> Result<(), Failure> {
     }
 }
 
-/// The finished pieces, by their ids.
+/// Loads the finished pieces, in order of their ids.
 fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Vec<Solid>, Failure> {
     let piece = |(number, file): (usize, Option<&String>)| {
         let missing = || {
@@ -117,7 +117,7 @@ fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Vec<Solid>, Failure> {
         .collect()
 }
 
-/// The surface with its patches that `build` wrote.
+/// Reads the surface with its patches that `build` wrote.
 fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure> {
     let wrong = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let (loaded, _) = load(path)?;
@@ -129,7 +129,7 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
         source,
         objects: Vec::new(),
     })?;
-    // Kits of program 0.1 number pieces from 0 here as in their plans.
+    // Kits of program 0.1 number pieces from 0 here, as in their plans.
     let first = i64::from(!labels.contains(&0));
     let patch = |&face: &u32| {
         let place = labels[face as usize].checked_sub(first);
@@ -151,7 +151,7 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
     })
 }
 
-/// The kit's sizes, or what is wrong with them.
+/// Parameters of the test for this kit; fails with a list of invalid values.
 fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
     let told = |e: PlanFileError| e.to_string();
     let sizes = plan.sizes().map_err(told)?;
@@ -227,9 +227,9 @@ fn print_table(params: &StressParams, tested: &StressReport) {
     }
 }
 
-/// How far the key slides out, where that can be seen.
+/// Prints how far the key slides out in each test, if that is visible.
 fn print_key(tested: &StressReport) {
-    /// What is less is play.
+    /// Least visible slide, mm; anything below is play.
     const SEEN_MM: f64 = 0.5;
     for printed in &tested.printed {
         for (done, o) in [("the punch", &printed.punch), ("the fall", &printed.drop)] {

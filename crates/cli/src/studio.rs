@@ -1,4 +1,4 @@
-//! `studio`: a page in the browser, and what the program does for it.
+//! `studio`: serves a page in the browser and the functions behind it.
 
 mod advice;
 mod bench;
@@ -17,7 +17,7 @@ use crate::args::StudioOptions;
 use crate::failure::Failure;
 use bench::Bench;
 
-/// `shellock studio`.
+/// Runs `shellock studio` until it is stopped; returns the exit code.
 pub fn studio(session: &Session, options: &StudioOptions) -> Result<u8, Failure> {
     let folder = options
         .project
@@ -51,7 +51,7 @@ pub fn studio(session: &Session, options: &StudioOptions) -> Result<u8, Failure>
     Ok(0)
 }
 
-/// Beside where the user is, named after the model.
+/// Default project folder: in the working folder, named after the model.
 fn usual_folder(model: Option<&Path>) -> PathBuf {
     let stem = model.and_then(Path::file_stem);
     let stem = stem.map_or_else(|| "shellock".into(), |s| s.to_string_lossy());

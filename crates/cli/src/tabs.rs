@@ -1,4 +1,5 @@
-//! What the page says of printing a kit and of handling it: plates, time, settings, and what to do where it does not fit.
+//! Text on printing and handling a kit: plates, time, settings, and advice for pieces that do not fit
+//! together.
 
 use shellock::PatchId;
 use shellock_geom::TriMesh;
@@ -9,7 +10,7 @@ use shellock_render::{ReportPart, ReportTab};
 use crate::printing::Printing;
 use shellock_kit::plan_file::piece_file;
 
-/// How to print it.
+/// Tab of the page on printing.
 pub fn print(printing: &Printing, pieces: &[TriMesh], has_booklet: bool) -> ReportTab {
     let pictures = printing.pictures(pieces);
     let of = pictures.len();
@@ -68,7 +69,7 @@ fn file_list(n_plates: usize, n_pieces: usize, has_booklet: bool) -> Vec<(String
     files
 }
 
-/// The booklet's page before the first step.
+/// Page of the booklet before the first step.
 pub fn before(printing: &Printing) -> Vec<Section> {
     let printer = printing.printer();
     let line = |(what, much): (String, String)| format!("{what}: {much}");
@@ -85,7 +86,7 @@ pub fn before(printing: &Printing) -> Vec<Section> {
     std::iter::once(takes).chain(of_care.take(4)).collect()
 }
 
-/// Instead of it, where the kit failed.
+/// Section of the booklet that replaces it if the kit failed.
 pub fn failed() -> Section {
     Section {
         title: "Do not print this kit".into(),
@@ -95,7 +96,7 @@ pub fn failed() -> Section {
     }
 }
 
-/// The booklet's page after the last step.
+/// Page of the booklet after the last step.
 pub fn after(has_passed: bool) -> Vec<Section> {
     let apart = section(taking_apart());
     let worth = if has_passed {
@@ -129,7 +130,7 @@ fn taking_apart() -> ReportPart {
     )
 }
 
-/// What to do with it after printing.
+/// Tab of the page on handling after printing.
 pub fn care(printer: &Printer) -> ReportTab {
     let clean: Vec<&str> = match printer.process {
         Process::Sla => vec![

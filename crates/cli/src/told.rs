@@ -1,4 +1,4 @@
-//! What is said of a kit that was made: as much as a maker needs, or all of it.
+//! Report on a finished kit for people: in short, or in full.
 
 use shellock::design::{Design, Settings};
 use shellock::metric::Holding;
@@ -16,10 +16,10 @@ use crate::printing::Printing;
 use crate::progress::Shown;
 use crate::{Session, bears};
 
-/// So many warnings and notes are told, problems all; the rest where all is asked for.
+/// Number of warnings and notes that the short report shows; it shows all problems.
 const MOST_TOLD: usize = 5;
 
-/// A finished kit, and what it is told with.
+/// A finished kit, with everything that its report needs.
 pub struct Finished<'a> {
     pub to: &'a Destination,
     pub made: &'a Design,
@@ -31,7 +31,7 @@ pub struct Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// The whole of it for people: figures, warnings, and one verdict at the end.
+    /// Prints the whole report for people: figures, warnings, and one verdict at the end.
     pub fn print(&self, session: &Session) {
         let (made, standing) = (self.made, self.standing);
         let verdict = &made.kit.verification;
@@ -91,11 +91,11 @@ impl Finished<'_> {
     }
 }
 
-/// What the wall bears, in words.
+/// Describes the wall's stress in a fall.
 pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) -> String {
     let StrengthParams { drop_m, material, .. } = &settings.strength;
     let hollow = 100.0 * (1.0 - strength.solid_share());
-    // Hardly anything was judged where hardly anything is hollow.
+    // Where little is hollow, the stress was computed on little of the surface.
     let judged = if hollow < 80.0 {
         format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
     } else {
@@ -109,7 +109,7 @@ pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) ->
     )
 }
 
-/// How good a plan is, in words.
+/// Describes the quality of a plan: its cost, and the bounds that are proven.
 pub fn quality(proof: &PlanProof) -> String {
     let PlanProof {
         cost,
@@ -120,7 +120,7 @@ pub fn quality(proof: &PlanProof) -> String {
         ..
     } = proof;
     let scope = scope(proof);
-    // Bounds that meet the least known cost are proofs; what is left is rounding.
+    // A bound that reaches the least known cost is a proof; any remaining difference is rounding.
     let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
     let chosen = match least_cost < cost {
         true => {
@@ -142,7 +142,7 @@ pub fn quality(proof: &PlanProof) -> String {
     )
 }
 
-/// For which plans a proof holds, in words.
+/// Describes the set of plans that a proof covers.
 pub fn scope(proof: &PlanProof) -> String {
     let ProofScope {
         keys,
@@ -170,7 +170,7 @@ pub fn scope(proof: &PlanProof) -> String {
     format!("{who}, sliding {how}{lessons}")
 }
 
-/// Where a plan is weakest: a seam, or each piece that comes apart.
+/// Describes the weakest places of a plan: its weakest seam, and each piece that comes apart.
 pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
     let seam = holding.seams.first().map(|s| {
         let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
@@ -190,7 +190,7 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
     seam.into_iter().chain(loose).collect()
 }
 
-/// How exact a printer must be; nothing where surfaces cross, which is warned of.
+/// Describes the precision that a printer needs; `None` if surfaces cross, which has its own warning.
 pub fn fits(made: &Design) -> Option<String> {
     let within_mm = made.fit.within_mm.filter(|mm| *mm > 0.0)?;
     let least_mm = 2.0 * within_mm;
@@ -209,7 +209,7 @@ pub fn fits(made: &Design) -> Option<String> {
     ))
 }
 
-/// What is told of `warnings`: those that matter most, each with its place, and how many more there are.
+/// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
 pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
     let ranked = Warning::ranked(warnings);
     let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
@@ -244,8 +244,8 @@ pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing
     lines
 }
 
-/// Warnings of how the model's file was taken, before anything else goes on: on standard output, or on the error
-/// output where nothing else is shown. Where events go with JSON they stand in its result.
+/// Prints warnings on how the model's file was read, before anything else. They go to standard output, or to
+/// standard error in quiet mode. With JSON they are part of the result instead.
 pub fn print_input_warnings(session: &Session, model: &Model) {
     for warning in &model.warnings {
         match session.shown {
@@ -256,14 +256,14 @@ pub fn print_input_warnings(session: &Session, model: &Model) {
     }
 }
 
-/// [`warning_lines`], on standard output.
+/// Prints the [`warning_lines`] on standard output.
 pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standing) {
     warning_lines(warnings, session.is_verbose, standing)
         .iter()
         .for_each(|line| println!("{line}"));
 }
 
-/// Each check on a line where all is told; else those that failed, or that none did.
+/// Prints every check if `is_verbose`; else those that failed, or a line that says that all passed.
 fn print_checks(verdict: &Verification, is_verbose: bool) {
     if verdict.passed() && !is_verbose {
         println!("all {} checks passed", verdict.checks.len());
@@ -279,13 +279,13 @@ fn print_checks(verdict: &Verification, is_verbose: bool) {
     }
 }
 
-/// Each check on a line, and loudly what failed and where.
+/// Prints every check, and then prominently each failure with its place.
 pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
     print_checks(verdict, true);
     print_failures(verdict, words);
 }
 
-/// What failed and where, if something did.
+/// Prints each failure with its place on standard error, if there is any.
 pub fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
     if !verdict.passed() {
         eprintln!(

@@ -1,6 +1,7 @@
-//! Numbers with units, as people write them: "15cm", "6 in", "2m", "70N", "90s".
+//! Parses numbers with units as people write them: "15cm", "6 in", "2m", "70N", "90s".
 
-/// Units of length and their lengths, mm; longer names first, as a number ends in the first that fits.
+/// Units of length and their lengths, mm. Longer names come first, because the first matching ending is
+/// taken.
 const LENGTHS: [(&str, f64); 13] = [
     ("micron", 1e-3),
     ("um", 1e-3),
@@ -17,13 +18,13 @@ const LENGTHS: [(&str, f64); 13] = [
     ("", 1.0),
 ];
 
-/// A length in mm: "150", "15cm", "6in". Whether it makes sense is asked later.
+/// Parses a length in mm: "150", "15cm", "6in". Its range is checked later.
 pub fn length_mm(text: &str) -> Result<f64, String> {
     with_unit(text, &LENGTHS)
         .ok_or_else(|| format!("\"{text}\" is no length; write mm, such as 150, or with a unit: 15cm, 6in"))
 }
 
-/// A height in m: "2m", "200cm", "2000 mm" or "2".
+/// Parses a height in m, above 0: "2m", "200cm", "2000 mm" or "2".
 pub fn metres(text: &str) -> Result<f64, String> {
     let units = [
         ("mm", 0.001),
@@ -37,24 +38,24 @@ pub fn metres(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm"))
 }
 
-/// A force in N: "70N", "7kg", "0.07 kN" or "70".
+/// Parses a force in N, above 0: "70N", "7kg", "0.07 kN" or "70".
 pub fn newtons(text: &str) -> Result<f64, String> {
     let units = [("kn", 1000.0), ("kg", 9.80665), ("n", 1.0), ("", 1.0)];
     above_0(with_unit(text, &units))
         .ok_or_else(|| format!("\"{text}\" is no force above 0 N; write for example 70N or 7kg"))
 }
 
-/// A time in s: "90", "90s", "2min".
+/// Parses a time in s: "90", "90s", "2min".
 pub fn seconds(text: &str) -> Result<f64, String> {
     let units = [("min", 60.0), ("h", 3600.0), ("s", 1.0), ("", 1.0)];
     with_unit(text, &units)
         .ok_or_else(|| format!("\"{text}\" is no time; write seconds, such as 90, or 2min"))
 }
 
-/// A number times that of the first unit it ends in.
+/// Number times the factor of the first unit that the text ends in; `None` if either is missing.
 fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim().to_lowercase();
-    // "inf" and "nan" are numbers, which end in no unit.
+    // "inf" and "nan" are numbers without a unit, although "nan" ends in "n", the newton.
     if let Ok(number) = text.parse::<f64>() {
         return Some(number * units.last()?.1);
     }

@@ -1,4 +1,4 @@
-//! What can be said of a test.
+//! Command-line arguments of `test`.
 
 use clap::{Args, ValueEnum};
 use shellock_mechanics::Material;

@@ -1,8 +1,8 @@
-//! What is to be kept whole, as it is said on the command line.
+//! Parses regions to keep whole from the command line.
 
 use shellock::segmentation::KeepWhole;
 
-/// `X,Y,Z,R` in mm, or a label.
+/// Parses a region to keep whole: `X,Y,Z,R` in mm with R above 0, or a label.
 pub fn keep_whole(text: &str) -> Result<KeepWhole, String> {
     let wrong = || "give X,Y,Z,R in mm, such as 0,-30,120,25, or a label, such as 3".to_owned();
     if let Ok(label) = text.trim().parse() {

@@ -1,4 +1,4 @@
-//! What can be said of how a model is made into a kit.
+//! Command-line options that say how a model is made into a kit.
 
 use std::path::PathBuf;
 
@@ -374,18 +374,18 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Work of the exact search in a second: measured on one core at 3 GHz, on models of 8 to 45 pieces.
+/// Work units of the exact search per second, measured on one core at 3 GHz, on models of 8 to 45 pieces.
 ///
-/// Plans depend on work and not on time, so that they are the same on every computer that is not far slower.
+/// Plans depend on work instead of time, so that every computer that is not far slower finds the same plan.
 const REVISIONS_PER_SECOND: f64 = 20_000.0;
 
 impl Options {
-    /// The printer that is named: of the user's own, or of those that come with the program.
+    /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
         printer_called(&self.printer, &self.own_printers)
     }
 
-    /// The library's parameters for pieces made on `printer`.
+    /// Parameters of the library for pieces made on `printer`.
     pub fn params(&self, printer: &Printer) -> Params {
         let mut p = Params::default();
         p.seed = self.seed;

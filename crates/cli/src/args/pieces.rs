@@ -1,10 +1,10 @@
-//! How many pieces are asked for, and which of them is the key.
+//! Command-line values for the number of pieces and for the key.
 
 use std::str::FromStr;
 
 use clap::ValueEnum;
 
-/// How many pieces are made.
+/// Number of pieces to make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
     Auto,
@@ -13,7 +13,7 @@ pub enum Pieces {
 }
 
 impl Pieces {
-    /// Those that are asked for by number.
+    /// Requested number of pieces; `None` unless it was given as a number.
     pub fn number(self) -> Option<usize> {
         match self {
             Self::Number(n) => Some(n),
@@ -44,13 +44,13 @@ pub enum Symmetric {
     Off,
 }
 
-/// Where the key comes from.
+/// Source of the key.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Key {
     Auto,
     Flattest,
     Piece(i64),
-    /// Cut near a place, mm.
+    /// Cut near this place, mm.
     Near([f64; 3]),
 }
 
@@ -71,7 +71,7 @@ impl FromStr for Key {
     }
 }
 
-/// `X,Y,Z`, finite.
+/// Parses a place `X,Y,Z` of finite coordinates.
 fn place(text: &str) -> Option<[f64; 3]> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     let place: [f64; 3] = numbers.ok()?.try_into().ok()?;

@@ -1,4 +1,4 @@
-//! Which files of a folder are models, where their kits go, and where it is kept what came of them.
+//! Names in a batch: which files of a folder are models, and where their kits and records go.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
@@ -8,17 +8,17 @@ use crate::failure::Failure;
 use crate::input::sha256;
 use crate::output::PLAN;
 
-/// How the names of models end.
+/// Endings of the names of models.
 pub const ENDINGS: [&str; 9] = ["stl", "obj", "ply", "off", "3mf", "glb", "gltf", "gz", "zip"];
-/// Folder of the records within the one for kits.
+/// Folder of the records, within the folder for kits.
 pub const RECORDS: &str = ".batch";
-/// Names of kits that the tables and records need for themselves.
+/// Kit names reserved for the tables and the records.
 const TAKEN: [&str; 3] = [super::table::PAGE, super::table::TABLE, RECORDS];
-/// Letters of a kit's name in that of its record.
+/// Number of letters of a kit's name that its record's name repeats.
 const TOLD_LETTERS: usize = 60;
 
-/// All models below `folder` but for what lies in `out` and in kits, by their paths within it, each with the name of
-/// its kit. A folder within it that cannot be read stands for what it holds.
+/// Lists all models below `folder`, except those in `out` and in kits: each model's path within `folder`,
+/// with the name of its kit. A subfolder that cannot be read is listed itself, in place of its contents.
 pub fn models(folder: &Path, out: Option<&Path>) -> Result<VecDeque<(PathBuf, PathBuf)>, Failure> {
     let out = out.and_then(|out| out.canonicalize().ok());
     let mut found = BTreeSet::new();
@@ -44,7 +44,7 @@ pub fn models(folder: &Path, out: Option<&Path>) -> Result<VecDeque<(PathBuf, Pa
             if is_hidden || out.is_some() && path.canonicalize().ok() == out {
                 continue;
             }
-            // Links to folders could lead around for ever.
+            // Links to folders are not followed, since they could form cycles.
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 left.push(name);
             } else if is_model(&name) && path.is_file() {
@@ -60,13 +60,13 @@ fn is_model(name: &Path) -> bool {
     extension.is_some_and(|e| ENDINGS.contains(&&e[..]))
 }
 
-/// Whether a folder is a kit of ours.
+/// Returns true if a folder is a kit of this program.
 fn is_kit(folder: &Path) -> bool {
     fs::read_to_string(folder.join(PLAN)).is_ok_and(|plan| plan.contains("\"shellock-plan\""))
 }
 
-/// The models, each with a name for its kit that no other has, on systems that do not tell capitals either, and that is
-/// no folder with other kits in it.
+/// Assigns each model a unique kit name: unique ignoring case, and never the name of a folder that contains
+/// other kits.
 fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
     let lower = |name: &str| name.to_lowercase();
     let stem = |model: &Path| model.with_extension("").to_string_lossy().into_owned();
@@ -79,7 +79,7 @@ fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
     }
     let is_alone = |name: &str| stems.get(&lower(name)).is_none_or(|n| *n == 1);
     let mut kits: BTreeMap<&PathBuf, String> = BTreeMap::new();
-    // Those that have their stem to themselves first, so that nobody takes it from them.
+    // Models with a unique stem come first, so that no other takes it.
     for model in &models {
         let name = stem(model);
         if is_alone(&name) && taken.insert(lower(&name)) {
@@ -108,12 +108,12 @@ fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
         .collect()
 }
 
-/// Where the record of a kit is kept.
+/// Path of a kit's record.
 pub fn record_file(out: &Path, kit: &str) -> PathBuf {
     out.join(RECORDS).join(format!("{}.json", record_name(kit)))
 }
 
-/// What the record of a kit is called: a name of its own, and not too long, for any kit's.
+/// Name of a kit's record: unique for each kit, and not too long.
 pub fn record_name(kit: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let told: String = kit.chars().take(TOLD_LETTERS).map(plain).collect();

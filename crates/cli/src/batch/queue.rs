@@ -1,4 +1,4 @@
-//! What waits to be made: models as they come while there is room, then again, one by one, what had not time enough.
+//! Queue of a batch: each model when there is room, then again, one by one, those that ran out of time.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -6,24 +6,24 @@ use std::path::{Path, PathBuf};
 use super::record::Record;
 use super::run::Job;
 
-/// A model to make.
+/// A model to be made.
 pub struct Task {
     pub job: Job,
     needs_mb: f64,
-    /// What came of it beside others, where it is made again.
+    /// Record of the first run beside others; `None` if the model was not made yet.
     pub first: Option<Box<Record>>,
 }
 
-/// What a worker is to do.
+/// Next action of a worker.
 pub enum Next {
     Make(Task),
-    /// There is no room now.
+    /// Wait: there is no room now.
     Wait,
-    /// Nothing is left for it.
+    /// Stop: nothing is left for this worker.
     Go,
 }
 
-/// Models that wait, and the room for them.
+/// Models that wait, and the memory left for them.
 pub struct Queue {
     models: VecDeque<(PathBuf, PathBuf)>,
     again: VecDeque<(Job, Box<Record>)>,
@@ -41,8 +41,8 @@ impl Queue {
         }
     }
 
-    /// The next model once there is room for it, of which there always is for one; when all were made once, those to be
-    /// made again, each alone: the worker that ends last makes them.
+    /// Returns the next model once there is room for it; a single model always has room. After all were made
+    /// once, the worker that ends last makes again, each alone, those that ran out of time.
     pub fn next(&mut self, needs_mb: impl Fn(&Path) -> f64) -> Next {
         let Some((model, _)) = self.models.front() else {
             return self.next_alone();
@@ -79,7 +79,7 @@ impl Queue {
         Next::Make(task)
     }
 
-    /// Gives back the task's room, and its record unless it is to be made again.
+    /// Frees the task's memory. Returns its record, or `None` if the model is to be made again.
     pub fn ended(&mut self, task: Task, record: Record) -> Option<Record> {
         self.free_mb += task.needs_mb;
         self.n_running -= 1;

@@ -1,4 +1,4 @@
-//! What came of one model.
+//! Result of one model in a batch.
 
 use std::fs;
 use std::path::Path;
@@ -12,21 +12,21 @@ use crate::input::sha256;
 use crate::output::PLAN;
 use crate::stages::write;
 
-/// How a model ended.
+/// Outcome for one model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// A kit that passes every check.
+    /// The kit passes every check.
     Verified,
-    /// A kit that does not.
+    /// The kit fails a check.
     Failed,
     /// No plan was found.
     NoPlan,
-    /// The model is no closed body, too thin, or broken.
+    /// The model is not a closed body, is too thin, or is broken.
     Refused,
-    /// It took longer than it may.
+    /// The model took longer than allowed.
     TooLong,
-    /// The program ended as it should never.
+    /// The program ended abnormally.
     Crashed,
 }
 
@@ -40,7 +40,7 @@ impl Status {
         Self::Crashed,
     ];
 
-    /// That `build` ended with this exit code.
+    /// Status for the exit code of `build`; crashed for unknown codes and for none.
     pub fn of_code(code: Option<i32>) -> Self {
         match code {
             Some(0) => Self::Verified,
@@ -62,51 +62,53 @@ impl Status {
         }
     }
 
-    /// Whether there is a kit, be it good or not.
+    /// Returns true if there is a kit, whether it passes or not.
     pub fn has_kit(self) -> bool {
         matches!(self, Self::Verified | Self::Failed)
     }
 
-    /// Whether the same inputs would end so again.
+    /// Returns true if the same inputs would give the same status again.
     fn is_final(self) -> bool {
         !matches!(self, Self::TooLong | Self::Crashed)
     }
 }
 
-/// What came of one model, as it is kept and told.
+/// Result of one model, as stored and as shown.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
-    /// Hash of all that it was made of: the model's bytes, the options, the program.
+    /// Hash of all inputs: the model's bytes, the options, the configuration file, the program.
     pub made_of: String,
-    /// The model, within the folder.
+    /// Path of the model, within the folder of models.
     pub model: String,
-    /// Its kit, within the folder for kits.
+    /// Path of the kit, within the folder for kits.
     pub kit: String,
     pub status: Status,
     pub seconds: f64,
-    /// Most memory that it took; `None` where the system does not tell.
+    /// Peak memory, MB; `None` if the system does not report it.
     pub peak_mb: Option<f64>,
     pub pieces: Option<u64>,
     pub volume_ratio: Option<f64>,
     pub n_warnings: usize,
     pub n_problems: usize,
-    /// What was said, the most severe first.
+    /// Messages, most severe first.
     pub said: Vec<String>,
-    /// What tells its kit from any other that lies there later; `None` where there is none.
+    /// Fingerprint of the kit's folder, from [`kit_is`]; `None` if there is no kit.
     #[serde(default)]
     pub kit_is: Option<String>,
-    /// Whether the time was over before a kit passed, with a share of the cores: alone it may, and is made again.
+    /// True if the time ran out before a kit passed, while other models shared the cores. The model is then
+    /// made again.
     #[serde(default)]
     pub lacks_time: bool,
-    /// Whether it was there already.
+    /// True if the record is from an earlier run.
     #[serde(skip)]
     pub is_old: bool,
-    /// A failure to write anything: no use to go on.
+    /// Failure to write a record, which ends the batch with an error.
     #[serde(skip)]
     pub unwritten: Option<String>,
 }
 
-/// The files of a kit with their sizes, and what its plan says, in one word; `None` where nothing lies there.
+/// Fingerprint of a kit's folder, from the names and sizes of its files and its plan; `None` if there is no
+/// folder.
 pub fn kit_is(folder: &Path) -> Option<String> {
     let mut told: Vec<String> = Vec::new();
     let mut left = vec![folder.to_owned()];
@@ -130,7 +132,7 @@ pub fn kit_is(folder: &Path) -> Option<String> {
 }
 
 impl Record {
-    /// Of a model of which nothing came yet.
+    /// Record of a model that has no result yet.
     pub fn blank(job: &Job, made_of: String) -> Self {
         Self {
             made_of,
@@ -151,8 +153,9 @@ impl Record {
         }
     }
 
-    /// The one at `path`, where it is of the same inputs, final, and its kit is as it was: none where there was none, as
-    /// what lay there may have been why.
+    /// Reads the record at `path`. `None` unless it was made from the same inputs, its status is final, and
+    /// the kit's folder is unchanged. A run without a kit matches only an absent folder: leftovers may have
+    /// caused the failure.
     pub fn read(path: &Path, made_of: &str, kit: &Path) -> Option<Self> {
         let bytes = fs::read(path).ok()?;
         let record: Self = serde_json::from_slice(&bytes).ok()?;
@@ -172,7 +175,7 @@ impl Record {
         write(path, text.as_bytes())
     }
 
-    /// What `build --json` said.
+    /// Adds the results in the output of `build --json`.
     pub fn of_output(mut self, output: &str) -> Self {
         let told: Value = output
             .lines()
@@ -203,7 +206,7 @@ impl Record {
         self
     }
 
-    /// A line for people.
+    /// Summary in one line for people.
     pub fn line(&self) -> String {
         let pieces = self.pieces.map_or(String::new(), |n| format!(", {n} pieces"));
         let why = match self.status {

@@ -1,4 +1,5 @@
-//! One model, made by a process: its memory is its own, and what goes wrong in it does not reach the others.
+//! Makes one model in a process of its own, so that its memory is separate and its failures do not reach the
+//! others.
 
 use std::fs;
 use std::io::Read;
@@ -16,34 +17,34 @@ use crate::failure::Failure;
 use crate::input::{read, sha256};
 use crate::output::PLAN;
 
-/// What a kit takes at least, and for each MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
+/// Memory that a kit takes at least, and per MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
 const LEAST_MB: f64 = 600.0;
 const MB_PER_MB: f64 = 12.0;
-/// How often it is looked how far a process is.
+/// Interval at which a process is checked.
 const LOOK: Duration = Duration::from_millis(40);
-/// How long a process that is to stop has for it.
+/// Time in which a process that was asked to stop must end.
 const TO_STOP: Duration = Duration::from_secs(10);
-/// Said of what was made twice.
+/// Message for a model that was made twice.
 const AGAIN: &str = "made twice: beside others the time (--time) was over before a kit passed";
-/// Said where no kit came of a model and its folder has one.
+/// Message for a model without a kit whose folder holds an earlier one.
 const OLD_KIT: &str = "the kit in its folder is of an earlier run";
-/// How much of what a process said in its own words is kept, lines.
+/// Number of lines kept of a process's own last messages.
 const KEPT_LINES: usize = 5;
 
-/// A model and its kit, within their folders.
+/// A model and its kit, as paths within their folders.
 pub struct Job {
     pub model: PathBuf,
     pub kit: PathBuf,
 }
 
-/// What is the same for all models.
+/// Settings shared by all models.
 pub struct Run {
     folder: PathBuf,
     out: PathBuf,
     program: PathBuf,
     /// Options of `build`, as they were given.
     arguments: Vec<String>,
-    /// All that kits depend on but for their models.
+    /// Hashes of all inputs except the model: program, options, configuration file.
     made_with: String,
     patience: Duration,
     pub n_workers: usize,
@@ -82,13 +83,14 @@ impl Run {
         })
     }
 
-    /// What a model's kit may take, MB.
+    /// Estimate of the memory that a model's kit takes, MB.
     pub fn needs_mb(&self, model: &Path) -> f64 {
         let bytes = fs::metadata(self.folder.join(model)).map_or(0, |m| m.len());
         LEAST_MB + MB_PER_MB * bytes as f64 / 1e6
     }
 
-    /// Makes the kit, unless it is there; says so where no kit came of the model and its folder has an earlier one.
+    /// Makes the kit unless it exists. If no kit results but the folder holds an earlier one, the record says
+    /// so.
     pub fn record(&self, session: &Session, job: &Job) -> Record {
         let mut record = self.kept_or_made(session, job);
         if !record.status.has_kit() && self.out.join(&job.kit).join(PLAN).is_file() {
@@ -97,7 +99,7 @@ impl Run {
         record
     }
 
-    /// Makes a kit again that had not time enough beside others: alone, on all cores.
+    /// Makes again, alone and on all cores, a kit that ran out of time beside others.
     pub fn again(&self, session: &Session, job: &Job, first: &Record) -> Record {
         let blank = Record::blank(job, first.made_of.clone());
         let mut record = self.made(session, blank, job, true);
@@ -105,7 +107,7 @@ impl Run {
         let seconds = record.seconds + first.seconds;
         let is_worse = first.status.has_kit() && !record.status.has_kit();
         if is_worse {
-            // Its kit lies there as it was; the next run tries again.
+            // The first run's kit is still there; the next batch tries again.
             record = first.clone();
             record.said.push(format!(
                 "made again it ended as {}: {}",
@@ -113,7 +115,7 @@ impl Run {
                 second.1
             ));
         } else {
-            // After what is wrong, before what is warned of.
+            // The message goes after the first error and before the warnings.
             let at = usize::from(record.status != Status::Verified).min(record.said.len());
             record.said.insert(at, AGAIN.to_owned());
         }
@@ -142,7 +144,7 @@ impl Run {
         self.noted(session, record, job)
     }
 
-    /// Kept for the next run, unless this one is stopped.
+    /// Writes the record for the next run, unless this one is being stopped.
     fn noted(&self, session: &Session, mut record: Record, job: &Job) -> Record {
         record.kit_is = kit_is(&self.out.join(&job.kit)).filter(|_| record.status.has_kit());
         if session.stop.load(Ordering::Relaxed) {
@@ -181,7 +183,7 @@ impl Run {
                 } else {
                     record = record.of_output(&ended.output);
                 }
-                // What was made alone had all that there is.
+                // A model that was made alone had all resources, so another try would not help.
                 let may_pass = matches!(record.status, Status::Failed | Status::NoPlan);
                 record.lacks_time &= may_pass && !is_alone;
                 if record.status == Status::Crashed {
@@ -216,7 +218,7 @@ impl Run {
         command
     }
 
-    /// Waits for the end; stops what takes too long, or is not wanted any more.
+    /// Waits for the process to end; stops it if it takes too long or the batch is stopped.
     fn watched(&self, session: &Session, mut child: Child) -> Ended {
         let (output, errors) = (collected(child.stdout.take()), collected(child.stderr.take()));
         let since = Instant::now();
@@ -253,7 +255,7 @@ impl Run {
     }
 }
 
-/// As long as that; for ever where it is infinite.
+/// Time limit for one model; unlimited if infinite. Fails unless it is above 0.
 fn patience(seconds: f64) -> Result<Duration, Failure> {
     if seconds.is_nan() || seconds <= 0.0 {
         return Err(Failure::Wrong(format!("--patience {seconds} s must be above 0")));
@@ -261,10 +263,10 @@ fn patience(seconds: f64) -> Result<Duration, Failure> {
     Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
 
-/// How a process ended.
+/// End of a process: its exit code and output.
 #[derive(Default)]
 struct Ended {
-    /// `None` where a signal ended it.
+    /// Exit code; `None` if a signal ended the process.
     code: Option<i32>,
     is_late: bool,
     peak_mb: Option<f64>,
@@ -272,19 +274,19 @@ struct Ended {
     last_words: Vec<String>,
 }
 
-/// All that comes out of a pipe, which would block the process if nobody took it.
+/// Collects all output of a pipe; a process blocks when nobody reads its pipe.
 fn collected(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
         if let Some(mut pipe) = pipe {
-            // What came before an error counts.
+            // Output before a read error is kept.
             let _ = pipe.read_to_end(&mut bytes);
         }
         String::from_utf8_lossy(&bytes).into_owned()
     })
 }
 
-/// Most memory that a process had so far, where the system tells it.
+/// Peak memory of a process so far, MB; `None` if the system does not report it.
 fn peak_mb(process: u32) -> Option<f64> {
     kilobytes(
         &fs::read_to_string(format!("/proc/{process}/status")).ok()?,
@@ -292,7 +294,7 @@ fn peak_mb(process: u32) -> Option<f64> {
     )
 }
 
-/// Memory that is free, where the system tells it.
+/// Free memory, MB; `None` if the system does not report it.
 pub fn available_mb() -> Option<f64> {
     kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")
 }

@@ -1,4 +1,4 @@
-//! The table of a batch: for machines and for people.
+//! Tables of a batch, for machines and for people.
 
 use std::fmt::Write as _;
 
@@ -6,9 +6,9 @@ use shellock_render::escaped;
 
 use super::record::{Record, Status};
 
-/// The table for machines.
+/// Name of the table for machines.
 pub const TABLE: &str = "batch.csv";
-/// The same with pictures.
+/// Name of the table for people, with pictures.
 pub const PAGE: &str = "batch.html";
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;margin:24px;color:#26242b;background:#f8f7f5}\
@@ -16,7 +16,7 @@ table{border-collapse:collapse;background:#fff}td,th{padding:6px 10px;border-bot
 td.n{text-align:right;font-variant-numeric:tabular-nums}img{width:240px;display:block}.verified{color:#1d7a46}.failed,.no-plan,.too-long,.crashed{color:#c0322b}\
 .refused{color:#8a5a06}small{color:#68646f}@media(prefers-color-scheme:dark){body{background:#1d1c21;color:#ecebf0}table{background:#27262c}td,th{border-color:#3a3841}}";
 
-/// Both, by their names.
+/// Builds both tables, each with its file name.
 pub fn files(records: &[Record]) -> Vec<(String, Vec<u8>)> {
     let files = [(TABLE, csv(records)), (PAGE, html(records))];
     files
@@ -46,7 +46,7 @@ fn csv(records: &[Record]) -> String {
     text
 }
 
-/// A field of RFC 4180; spreadsheets would take what begins as a formula for one.
+/// Quotes a field as in RFC 4180, with an apostrophe before text that spreadsheets would take for a formula.
 fn quoted(text: &str) -> String {
     let text = text.replace(['\n', '\r'], " ");
     let is_formula = text.starts_with(['=', '+', '-', '@']);
@@ -89,7 +89,7 @@ fn html(records: &[Record]) -> String {
     )
 }
 
-/// A path within the folder as a relative address.
+/// Turns a path within the folder into a relative URL.
 fn address(path: &str) -> String {
     let mut text = String::new();
     for byte in path.replace('\\', "/").bytes() {

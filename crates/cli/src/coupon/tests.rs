@@ -33,7 +33,7 @@ fn every_number_saved_gives_back_its_clearances_and_all_else_of_the_printer_it_i
                     ..base.clone()
                 }
             );
-            // The same plate, read again: nothing moves on.
+            // Saving the same result again changes nothing.
             assert_eq!(with_printer(&text, &base, &fit, "Workshop").unwrap(), text);
         }
     }
@@ -56,7 +56,7 @@ fn comments_and_all_that_is_not_a_clearance_stay_as_they_are() {
             ),
         );
     assert_eq!(saved, expected);
-    // A printer that is based on one of the user's own has all that this one has.
+    // A printer based on one of the user's own has all its settings.
     let copied = with_printer(text, &base, &loosest, "attic").unwrap();
     assert!(copied.starts_with(text));
     assert_eq!(own(&copied, "attic").bed_mm, base.bed_mm);
@@ -74,7 +74,7 @@ fn what_cannot_be_saved_is_told() {
     assert!(refusal("printers = 3\n").contains("must be a table"));
     assert!(refusal("[printers]\nworkshop = 3\n").contains("workshop"));
     assert!(refusal("size = \n").contains("line 1"));
-    // Tables in one line are as good.
+    // Inline tables work as well.
     let text = with_printer(
         "printers = { workshop = { process = \"sla\" } }\n",
         &base,
@@ -95,7 +95,7 @@ fn the_plate_fits_the_bed_of_every_preset_and_a_small_bed_is_refused_with_the_si
         assert!(bounds.min.x >= EDGE_MM && bounds.max.x <= width - EDGE_MM);
         assert!(bounds.min.y >= EDGE_MM && bounds.max.y <= depth - EDGE_MM);
         assert!(bounds.min.z == 0.0 && bounds.max.z <= height);
-        // Half an hour by a slicer; the closed form, made for large parts, says a sixth more for filament.
+        // A slicer says half an hour; the closed form, made for large parts, says a sixth more for filament.
         let seconds = plate.seconds();
         assert!((300.0..2200.0).contains(&seconds), "{}: {seconds}", printer.name);
     }

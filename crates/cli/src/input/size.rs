@@ -1,4 +1,4 @@
-//! Size of what is made: as asked for, as the file states it, or a guess that the user is warned of.
+//! Size of the kit: as the options say, as the file states it, or a guess that the user is warned of.
 
 use shellock::Warning;
 use shellock::warning::Cause;
@@ -8,20 +8,21 @@ use shellock_geom::Aabb;
 use crate::args::Options;
 use crate::failure::Failure;
 
-/// Longest side of a model that nobody would ask about, mm. A file of such a size in its own units is taken to
-/// be in millimetres.
+/// Range of longest sides that nobody would question, mm. A file with such a size in its own units is taken
+/// to be in millimetres.
 const USUAL_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
-/// Longest side of what is made, mm: a torus of 2000 mm already takes 8 GB and more than three minutes.
+/// Range of longest sides that can be made, mm: a torus of 2000 mm already takes 8 GB and more than three
+/// minutes.
 const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
-/// Share by which scaling to a length may miss it.
+/// Relative error that scaling to a length may have.
 const ROUNDING: f64 = 1e-9;
-/// Longest side where the file gives no size, mm.
+/// Longest side if the file gives no size, mm.
 pub(super) const DEFAULT_SIZE_MM: f64 = 150.0;
-/// Longest sides, in file units, of models that programs scale to a box of 1 or of 2 units: generators of
-/// meshes write 0.98 and 1.9 as often as 1 and 2.
+/// Longest sides, in file units, of models that programs scale to a box of 1 or of 2 units. Mesh generators
+/// write 0.98 and 1.9 as often as 1 and 2.
 const NORMALISED: [std::ops::RangeInclusive<f64>; 2] = [0.9..=1.0 + ROUNDING, 1.8..=2.0 + ROUNDING];
 
-/// Millimetres a file unit, and a warning where the size is a guess or unusual.
+/// Millimetres per file unit, with a warning if the size is a guess or unusual. Fails if it cannot be made.
 pub(super) fn scale(
     options: &Options,
     loaded: &Loaded,
@@ -48,7 +49,7 @@ pub fn is_usual(longest_mm: f64) -> bool {
     USUAL_MM.contains(&longest_mm)
 }
 
-/// A number that can be a length, or a scale.
+/// Returns `mm` if it can be a length or a scale: finite and above 0.
 pub fn length(what: &str, mm: f64) -> Result<f64, Failure> {
     if mm.is_finite() && mm > 0.0 {
         Ok(mm)
@@ -57,7 +58,7 @@ pub fn length(what: &str, mm: f64) -> Result<f64, Failure> {
     }
 }
 
-/// Refuses sizes that are not made.
+/// Fails if a longest side is outside the range that can be made.
 pub(super) fn check_size(longest_mm: f64) -> Result<(), Failure> {
     let (least, most) = (MADE_MM.start(), MADE_MM.end());
     // A model scaled to an end of the range may miss it by rounding.
@@ -70,7 +71,7 @@ pub(super) fn check_size(longest_mm: f64) -> Result<(), Failure> {
     )))
 }
 
-/// A length with at most three decimals, or in powers of ten where that says nothing.
+/// Writes a length with at most three decimals, or in powers of ten if decimals say nothing.
 fn rounded(length: f64) -> String {
     if (0.001..1e6).contains(&length) {
         format!("{}", (1000.0 * length).round() / 1000.0)
@@ -84,7 +85,7 @@ fn is_normalised(format: Format, longest: f64) -> bool {
     matches!(format, Format::Gltf | Format::Glb) && NORMALISED.iter().any(|range| range.contains(&longest))
 }
 
-/// A warning of a size that the file states and few people mean.
+/// Warns of a size that the file states but that few people intend.
 fn unusual(longest_mm: f64) -> Option<Warning> {
     (!is_usual(longest_mm)).then(|| {
         let how = if longest_mm > *USUAL_MM.end() { "large" } else { "small" };
@@ -98,7 +99,7 @@ fn unusual(longest_mm: f64) -> Option<Warning> {
     })
 }
 
-/// A warning of a size that the file does not state.
+/// Warns of a size that the file does not state.
 fn guess(loaded: &Loaded, longest: f64) -> Warning {
     let what = match loaded.unit_mm {
         Some(mm) if is_normalised(loaded.format, longest) => format!(
@@ -120,7 +121,7 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
         ("inch", 25.4),
         ("micron", 0.001),
     ];
-    // Millimetres are what most programs mean, so they are offered wherever a kit could be made.
+    // Most programs mean millimetres, so these are offered wherever a kit could be made.
     let fits = |name: &str, size: f64| {
         let range = if name == "mm" { MADE_MM } else { USUAL_MM };
         range.contains(&size)
@@ -156,7 +157,7 @@ fn warning(code: &'static str, sentence: String) -> Warning {
 mod tests {
     use super::*;
 
-    /// 2000 mm asked for may come out as 2000.0000000000002.
+    /// A size of 2000 mm may come out as 2000.0000000000002 after scaling.
     #[test]
     fn both_ends_of_the_range_of_sizes_are_made_whatever_rounding_does() {
         for mm in [10.0_f64, 2000.0] {

@@ -1,10 +1,11 @@
-//! What the library says of labels and patches, said of the numbers that the page shows.
+//! Warnings of the library in words for the page, with the page's own piece numbers.
 
 use shellock::{Cause, PatchId, Warning};
 
-/// The sentence of `warning` for the page; `number` is what the page calls a patch, from 0.
+/// Sentence for `warning` on the page; `number` gives the page's number of a patch, from 0.
 ///
-/// Labels that a person painted are the page's numbers from 1; patches are numbered as they will be cut.
+/// Painted labels are the page's numbers, from 1. Patches are numbered in the order in which they will be
+/// cut.
 pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
     match &warning.cause {
         Cause::LabelSplit { label, area_mm2 } => {
@@ -47,7 +48,7 @@ pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
     }
 }
 
-/// Whether "Mend" does what `warning` says will be done.
+/// Returns true if "Mend" makes the change that `warning` announces.
 pub fn is_mended(warning: &Warning) -> bool {
     matches!(
         warning.cause,

@@ -1,4 +1,4 @@
-//! What the studio's page works on: one project, its model and its pieces.
+//! State behind the studio's page: one project, its model and its pieces.
 
 #[cfg(test)]
 mod tests;
@@ -32,7 +32,7 @@ use crate::input::{read, shellock_figure};
 use crate::output::{lying, standing};
 use crate::project::ModelOf;
 
-/// Options that make another solid of the model's file.
+/// Options that change the solid made from the model's file.
 const OF_MODEL: [&str; 13] = [
     "size",
     "height",
@@ -51,7 +51,7 @@ const OF_MODEL: [&str; 13] = [
 /// Longest side of the figures that come with the program, mm.
 const SAMPLE_MM: f64 = 120.0;
 
-/// One project, open.
+/// A project that is open in the studio.
 pub struct Bench {
     store: Store,
     printers: Vec<Printer>,
@@ -59,29 +59,31 @@ pub struct Bench {
 }
 
 struct State {
-    /// Grows with every change.
+    /// Counter that grows with every change.
     revision: u64,
     model: Option<ModelOf>,
     choices: Choices,
     options: Arc<Options>,
     figure: Option<Arc<Figure>>,
-    /// Whether a model is being opened, and why the last one could not be.
+    /// True while a model is being opened; `problem` says why the last one could not be.
     is_opening: bool,
     problem: Option<String>,
     pieces: Option<Pieces>,
-    /// One label a face of the file, until the model is open.
+    /// Labels, one a face of the file, kept until the model is open.
     file_labels: Option<Vec<u32>>,
     judged: Option<Arc<Judged>>,
-    /// Stops the judgement that runs.
+    /// Flag that stops the running judgement.
     judging: Arc<AtomicBool>,
-    /// What the kit in the making is made of.
+    /// Hash of the project that the kit in the making is built from.
     making: Option<String>,
 }
 
 impl State {
-    /// The choices that mean the same faces with `pieces` as the present ones do without, where they have to change.
+    /// Choices adapted to `pieces`, so that their labels name the same faces as before; `None` if nothing has
+    /// to change.
     ///
-    /// Options name the labels that the model's file has, but the numbers of painted pieces once a person has painted.
+    /// Options name the labels of the model's file, or the numbers of painted pieces once a person has
+    /// painted.
     fn relabelled(&self, pieces: &Pieces) -> Option<Choices> {
         let model = &self.figure.as_ref()?.model;
         let own = model.labels.as_deref()?;
@@ -97,7 +99,8 @@ impl State {
     }
 }
 
-/// The label in `after` that has most of the area of the faces with `label` in `before`; `None` where there are none.
+/// Label in `after` with most of the area of the faces labelled `label` in `before`; `None` if there are
+/// none.
 fn successor(label: i64, before: &[i64], after: &[i64], area: impl Fn(usize) -> f64) -> Option<i64> {
     let mut areas: BTreeMap<i64, f64> = BTreeMap::new();
     for (face, _) in before.iter().enumerate().filter(|(_, of)| **of == label) {
@@ -107,14 +110,14 @@ fn successor(label: i64, before: &[i64], after: &[i64], area: impl Fn(usize) -> 
     largest.map(|(label, _)| label)
 }
 
-/// The pieces as the page shows them.
+/// Pieces as the page shows them.
 #[derive(Clone)]
 pub(super) struct Pieces {
-    /// One for each triangle that is shown, from 0.
+    /// Labels from 0, one for each triangle that is shown.
     pub labels: Arc<Vec<u32>>,
-    /// Whether a person changed them; else `build` divides by itself.
+    /// True if a person changed the pieces; otherwise `build` divides by itself.
     pub is_painted: bool,
-    /// The division that they show, as long as it is what the options make.
+    /// Division that the pieces show; `None` once the options would give another.
     pub divided: Option<Arc<SegmentedSurface>>,
     notes: Vec<String>,
 }
@@ -124,14 +127,14 @@ impl Pieces {
         self.labels.iter().collect::<BTreeSet<_>>().len()
     }
 
-    /// The number of the piece of each triangle, from 1, as people and files know it.
+    /// Piece number of each triangle, from 1, as in the files and for people.
     fn numbers(&self) -> Vec<i64> {
         self.labels.iter().map(|&label| i64::from(label) + 1).collect()
     }
 }
 
 impl Bench {
-    /// The project in `folder`, which may be new; its model is not open yet.
+    /// Opens the project in `folder`, which may be new. The model is not opened yet.
     pub fn open(folder: PathBuf) -> Result<Self, Failure> {
         let (
             store,
@@ -170,7 +173,7 @@ impl Bench {
         })
     }
 
-    /// Opens the model that the project names, if it names one.
+    /// Opens the model that the project names, if any.
     pub fn load(&self) {
         let Some(model) = self.lock().model.clone() else {
             return;
@@ -180,15 +183,14 @@ impl Bench {
         }
     }
 
-    /// Takes a copy of the user's file into the project, where it is another than the project's; it is opened by
-    /// [`Self::load`].
+    /// Copies the user's file into the project if it differs from the project's. [`Self::load`] opens it.
     pub fn take(&self, path: &Path) -> Result<(), Failure> {
         let name = path
             .file_name()
             .map_or_else(|| "model".into(), |n| n.to_string_lossy());
         let bytes = read(path)?;
         let extension = path.extension().and_then(|e| e.to_str());
-        // What cannot be read is told of when it is opened.
+        // An unreadable file is reported when it is opened.
         let model = match shellock_formats::read_mesh(&bytes, extension) {
             Ok(loaded) => self.kept(&name, &loaded, &bytes)?,
             Err(_) => self.store.keep(&name, &bytes)?,
@@ -201,7 +203,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Keeps a model's file, or one of the same shape that can be painted.
+    /// Stores a model's file, or a version of the same shape with triangles fine enough for painting.
     fn kept(&self, name: &str, loaded: &Loaded, bytes: &[u8]) -> Result<ModelOf, Failure> {
         match finer(name, loaded) {
             Some((name, bytes)) => self.store.keep(&name, &bytes),
@@ -209,7 +211,7 @@ impl Bench {
         }
     }
 
-    /// Opens a model of the folder.
+    /// Opens a model from the project's folder.
     fn show(&self, model: ModelOf) -> Result<(), Refusal> {
         self.lock().is_opening = true;
         let opened = self.opened(&model, &self.lock().options.clone());
@@ -229,7 +231,7 @@ impl Bench {
         Figure::open(&Session::silent(&Arc::default()), &path, options).map_err(|e| self.refused(&e))
     }
 
-    /// The state is another: what was judged is of another, and the project is written.
+    /// Records a change: discards the judgement of the former state and saves the project.
     fn changed(&self, state: &mut State) -> Result<(), Refusal> {
         state.revision += 1;
         state.judged = None;
@@ -246,7 +248,7 @@ impl Bench {
         saved.map_err(|e| self.refused(&e))
     }
 
-    /// New pieces for the state of `revision`; refuses where it is another by now.
+    /// Sets new pieces for the state of `revision`; refuses if the state has changed since.
     fn set_pieces(&self, revision: u64, pieces: Pieces) -> Result<Value, Refusal> {
         let mut state = self.lock();
         if state.revision != revision {
@@ -262,7 +264,7 @@ impl Bench {
         Ok(json!({ "revision": state.revision, "n_pieces": n_pieces, "method": method, "notes": notes }))
     }
 
-    /// What is needed to work on the model while the page goes on.
+    /// Copies what is needed to work on the model while the page goes on.
     fn snapshot(&self) -> Result<Snapshot, Refusal> {
         let state = self.lock();
         let figure = state.figure.clone();
@@ -274,7 +276,7 @@ impl Bench {
         })
     }
 
-    /// Words for the page, which knows nothing of folders.
+    /// Words a failure for the page, without the path of the project's folder.
     fn refused(&self, failure: &Failure) -> Refusal {
         let folder = format!("{}/", self.store.folder().display());
         let words = failure.to_string().replace(&folder, "");
@@ -352,7 +354,7 @@ impl Workshop for Bench {
         };
         let mut state = self.lock();
         (state.choices, state.options) = (choices, options);
-        // Others may divide otherwise, but for the key: it is cut out of what is divided.
+        // Any option may change the division, except the key, which is cut out of the divided surface.
         if let Some(pieces) = &mut state.pieces
             && changes.keys().any(|name| name != "key")
         {
@@ -373,7 +375,7 @@ impl Workshop for Bench {
 
     fn open(&self, name: &str, file: &Path) -> Result<(), Refusal> {
         let bytes = read(file).map_err(|e| self.refused(&e))?;
-        // What cannot be read is not kept.
+        // A file that cannot be read is not kept.
         let extension = Path::new(name).extension().and_then(|e| e.to_str());
         let loaded = shellock_formats::read_mesh(&bytes, extension)
             .map_err(|e| Refusal::wrong(format!("{name}: {e}")))?;
@@ -439,7 +441,7 @@ impl Workshop for Bench {
             .figure
             .shown_labels(&of_file)
             .unwrap_or_else(|| painted.clone());
-        // A face of the file is of one piece.
+        // A face of the file belongs to one piece only.
         let is_changed = kept != painted;
         let mut told = self.set_pieces(of.revision, painted_by_hand(kept))?;
         told["is_changed"] = is_changed.into();
@@ -535,7 +537,7 @@ impl Workshop for Bench {
         let made_of = self.lock().making.take();
         let result: Value = serde_json::from_str(output).unwrap_or_default();
         if let (Some(made_of), Some(code @ (0 | 1))) = (made_of, code) {
-            // The kit is there though nobody may know of what it was made.
+            // The kit exists even if the note on its inputs cannot be written.
             let _ = self.store.note_kit(&made_of, code, &result);
         }
     }
@@ -550,7 +552,7 @@ fn painted_by_hand(labels: Vec<u32>) -> Pieces {
     }
 }
 
-/// The pieces that `segment` would make.
+/// Divides the model as `segment` would.
 fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
     let stop = Arc::default();
     let session = Session::silent(&stop);

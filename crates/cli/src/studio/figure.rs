@@ -1,4 +1,5 @@
-//! A model that is open in the studio: its surface as the page shows it, and the way from there to the faces of its file.
+//! A model that is open in the studio: the surface that the page shows, and its relation to the faces of the
+//! file.
 
 use std::path::Path;
 
@@ -16,25 +17,25 @@ use crate::output::standing;
 use crate::shape::{shape_warnings, wall_mm};
 use crate::shares::largest_shares;
 
-/// How a mesh for the page begins: "SHMV", then the version.
+/// First bytes of a mesh for the page: "SHMV", then the version.
 const MAGIC: u32 = 0x564d_4853;
 const VERSION: u32 = 1;
 
-/// A model that is open.
+/// An open model with the data that the page shows.
 pub struct Figure {
-    /// As it is made: described by fewer triangles where it has very many.
+    /// Model as it is made: simplified if it has very many triangles.
     pub model: Model,
-    /// Where the model was given with more triangles: for each of those the nearest that is shown, the face of the
-    /// file that it came from, and its area.
+    /// Original triangles if the model was simplified: for each, the nearest shown triangle, its face of the
+    /// file, and its area.
     full: Option<Vec<(u32, u32, f64)>>,
-    /// Which triangles are too thin to be hollow.
+    /// True for triangles that are too thin to be hollow.
     is_thin: Vec<bool>,
-    /// What is said of those.
+    /// Warnings about the file and the shape, such as thin parts.
     pub warnings: Vec<String>,
 }
 
 impl Figure {
-    /// Opens the file at `path`.
+    /// Opens the model in the file at `path`.
     pub fn open(session: &Session, path: &Path, options: &Options) -> Result<Self, Failure> {
         let given = input::model(session, path, options)?;
         let before = (given.solid.mesh().clone(), given.file_face.clone());
@@ -58,12 +59,12 @@ impl Figure {
         })
     }
 
-    /// How many triangles are shown.
+    /// Number of triangles that are shown.
     pub fn n_faces(&self) -> usize {
         self.model.solid.mesh().triangles.len()
     }
 
-    /// Whether all triangles of the model are shown.
+    /// Returns true if all triangles of the model are shown.
     pub fn is_exact(&self) -> bool {
         self.full.is_none()
     }
@@ -72,16 +73,17 @@ impl Figure {
     pub fn thin_share(&self) -> f64 {
         let mesh = self.model.solid.mesh();
         let thin = (0..self.n_faces()).filter(|&f| self.is_thin[f]);
-        // An empty sum is -0.
+        // An empty sum is −0; adding 0 makes it 0.
         thin.map(|f| mesh.face_area(f)).sum::<f64>() / mesh.area() + 0.0
     }
 
-    /// The surface as the page reads it: header, points (32-bit), corners, a byte a triangle for what is thin.
+    /// Surface in the page's format: header, points (32-bit), corners, and a byte for each triangle that is 1
+    /// if thin.
     pub fn bytes(&self, up: Axis) -> Vec<u8> {
         shown(self.model.solid.mesh(), up, self.is_thin.iter().copied())
     }
 
-    /// For each triangle that is shown, the patch that has most of it.
+    /// Patch with the largest share of each triangle that is shown.
     pub fn labels_of(&self, surface: &SegmentedSurface) -> Vec<u32> {
         let patches = surface.source_face.iter().zip(&surface.patch_of_face).enumerate();
         let parts = patches.map(|(face, (&source, patch))| (source, patch.0, surface.mesh.face_area(face)));
@@ -89,7 +91,7 @@ impl Figure {
         most.into_iter().map(Option::unwrap_or_default).collect()
     }
 
-    /// For each face of the file, the label that most of it has; 0 where nothing is left of a face.
+    /// Label with the largest share of each face of the file; 0 for faces of which nothing is left.
     pub fn file_labels(&self, labels: &[u32]) -> Vec<u32> {
         let n = self.model.n_file_faces;
         let full = self.full.iter().flatten();
@@ -100,12 +102,13 @@ impl Figure {
         let mesh = self.model.solid.mesh();
         let own = self.model.file_face.iter().enumerate();
         let own = largest_shares(n, own.map(|(f, &face)| (face, labels[f], mesh.face_area(f))));
-        // A face that a triangle shown stands for has that one's label: it is where the program looks.
+        // If a shown triangle stems from the face, its label counts, because that is where the program looks.
         let of_face = own.into_iter().zip(most).map(|(own, most)| own.or(most));
         of_face.map(Option::unwrap_or_default).collect()
     }
 
-    /// The labels of the triangles shown, from one a face of the file.
+    /// Labels of the shown triangles, from one label a face of the file; `None` if the number of faces
+    /// differs.
     pub fn shown_labels(&self, of_file: &[u32]) -> Option<Vec<u32>> {
         let is_fitting = of_file.len() == self.model.n_file_faces;
         is_fitting.then(|| {
@@ -118,7 +121,7 @@ impl Figure {
     }
 }
 
-/// A mesh as the page reads it, standing.
+/// Turns a mesh upright and writes it in the page's format.
 pub fn shown(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> Vec<u8> {
     let n = [mesh.points.len(), mesh.triangles.len()].map(|n| n as u32);
     let header = [MAGIC, VERSION, n[0], n[1]];
@@ -131,7 +134,8 @@ pub fn shown(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> V
     bytes
 }
 
-/// For each triangle of `full`, the one of `shown` that its middle is nearest to, its face and its area.
+/// For each triangle of `full`: the triangle of `shown` nearest to its centre, its face of the file, and its
+/// area.
 fn nearest(shown: &TriMesh, full: &TriMesh, file_face: &[u32]) -> Vec<(u32, u32, f64)> {
     let bvh = TriangleBvh::new(shown);
     let of = |face: usize| {

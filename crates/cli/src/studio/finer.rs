@@ -1,6 +1,6 @@
-//! Triangles that can be painted on: a model of few large ones is kept with finer ones, its shape the same.
+//! Refines the triangles of a coarse model so that it can be painted on; the shape stays the same.
 //!
-//! A kit has one label a triangle of its model's file, so that a brush can be no finer than those.
+//! A kit has one label a triangle of its model's file, so a brush cannot be finer than those triangles.
 
 use shellock_formats::{LabelSource, Loaded, write_ply};
 use shellock_geom::repair::{RepairMode, repair};
@@ -9,18 +9,18 @@ use shellock_geom::{Solid, Topology};
 
 use crate::input::{MANY_TRIANGLES, is_usual};
 
-/// Longest edge that is left, as a share of the model's diagonal: 3 to 4 mm on a figure of 150 mm.
+/// Longest edge after refinement, as a share of the model's diagonal: 3 to 4 mm on a figure of 150 mm.
 const LONGEST_SHARE: f64 = 1.0 / 60.0;
-/// Edges so many times as long are too long to paint between.
+/// Multiple of the longest edge above which an edge is too long for painting.
 const COARSE: f64 = 2.0;
-/// Share of the surface in such triangles from which it matters.
+/// Share of the surface in triangles with such edges from which the model is refined.
 const LEAST_COARSE: f64 = 0.15;
-/// Halving goes on as long as there are fewer triangles: with four times as many a model is still shown as it is.
+/// Number of triangles at which halving ends: with four times as many, a model is still shown unsimplified.
 const MANY: usize = MANY_TRIANGLES / 4;
-/// How the name of a file ends that was made so.
+/// Ending of the name of a refined file.
 const ENDING: &str = "-fine.ply";
 
-/// What is said of such a model.
+/// Note on a refined model, for the page; `None` for other files.
 pub fn note(file: &str) -> Option<String> {
     file.ends_with(ENDING).then(|| {
         "its triangles were large and are divided, so that they can be painted on; its shape is the same"
@@ -28,15 +28,15 @@ pub fn note(file: &str) -> Option<String> {
     })
 }
 
-/// Name and bytes of a file with finer triangles; `None` where those of `loaded` will do, where it needs mending, or
-/// where it is divided in a way that such a file could not keep.
+/// Name and bytes of a file with finer triangles. `None` if the triangles of `loaded` are fine enough, if its
+/// surface needs repair, or if the new file could not keep its labels or its size.
 pub fn finer(name: &str, loaded: &Loaded) -> Option<(String, Vec<u8>)> {
     let keeps_all = loaded
         .labellings
         .iter()
         .all(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint));
     let longest_mm = loaded.unit_mm.unwrap_or(1.0) * loaded.bounds().size().max_element();
-    // A size that only the file's own unit vouches for would be lost, too.
+    // A size that relies on the file's own unit alone would be lost, too.
     let keeps_size = !loaded.unit_is_stated || is_usual(longest_mm);
     if !keeps_all || !keeps_size || !is_coarse(loaded) {
         return None;
@@ -68,7 +68,7 @@ fn is_coarse(loaded: &Loaded) -> bool {
     coarse.map(|f| mesh.face_area(f)).sum::<f64>() > LEAST_COARSE * mesh.area()
 }
 
-/// Long edges are halved until there are none; the triangle that each is a part of.
+/// Halves long edges until there are none or [`MANY`] triangles; also returns the original triangle of each.
 fn halved(mut solid: Solid) -> (Solid, Vec<u32>) {
     let longest = LONGEST_SHARE * solid.mesh().bounds().size().length();
     let mut source: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();

@@ -1,5 +1,5 @@
-//! What is said of pieces before they are made: whether they lock, who is in whose way, what will be mended, and where
-//! a key can be.
+//! Judgement of pieces before they are made: whether they lock, which block others, what "Mend" would change,
+//! and where a key can be.
 
 use serde_json::{Value, json};
 use shellock::design::{Verdict, outlook};
@@ -20,20 +20,20 @@ use crate::failure::Failure;
 use crate::output::standing;
 use crate::place::Standing;
 
-/// How far ghosts of keys stand off the surface, mm.
+/// Distance of the outlines of keys from the surface, mm.
 const OFF_MM: f64 = 0.6;
 
-/// A judgement.
+/// Result of a judgement.
 pub struct Judged {
-    /// As the page reads it.
+    /// Judgement as JSON for the page.
     pub told: Value,
-    /// The pieces as they would be mended, one for each triangle that is shown.
+    /// Labels after mending, one for each triangle that is shown.
     pub mended: Vec<u32>,
-    /// The surface cut along its seams, and a piece of the page for each of its triangles.
+    /// Surface cut along its seams, with the page's label of each of its triangles.
     pub cut: Vec<u8>,
 }
 
-/// Judges `pieces`.
+/// Judges `pieces` as they would be made with the options.
 pub fn judge(
     session: &Session,
     figure: &Figure,
@@ -47,7 +47,7 @@ pub fn judge(
         .then(|| labels_shown.iter().map(|&l| i64::from(l) + 1).collect());
     let labels = given.as_deref().or(model.labels.as_deref());
     let checked = checked(options)?;
-    // What is painted says how many pieces there are.
+    // Painted labels determine the number of pieces.
     let params = if labels.is_none() {
         fitted(session, &checked, options, model)?
     } else {
@@ -89,7 +89,7 @@ pub fn judge(
     Ok(Judged { told, mended, cut })
 }
 
-/// How places and pieces are told to the page: standing, and by the labels that it shows.
+/// Translates places and pieces for the page: upright, and by the labels that it shows.
 struct View<'a> {
     up: Axis,
     standing: Standing,
@@ -101,7 +101,7 @@ impl View<'_> {
         standing(self.up, Vec3::from(place)).to_array()
     }
 
-    /// For each patch the label that most of it has on the page.
+    /// Label of the page with the largest share of each patch.
     fn labels(&self, surface: &SegmentedSurface) -> Vec<u32> {
         let mut areas = vec![std::collections::BTreeMap::<u32, f64>::new(); surface.n_patches];
         for (face, &source) in surface.source_face.iter().enumerate() {
@@ -179,7 +179,7 @@ impl View<'_> {
             "mends": advice::is_mended(warning) })
     }
 
-    /// The smooth lines between pieces.
+    /// Smooth lines between the pieces, as JSON.
     fn seams(&self, surface: &SegmentedSurface) -> Value {
         let line = |points: &[Vec3]| -> Vec<f32> {
             let standing = points.iter().flat_map(|&p| standing(self.up, p).to_array());
@@ -193,7 +193,7 @@ impl View<'_> {
     }
 
     fn keys(&self, sites: &[KeySite], chosen: Option<KeySite>) -> Value {
-        // One that was asked for near a place may be none of those that are best anywhere.
+        // A key that the options place may not be among the best sites.
         let own = chosen.filter(|key| !sites.iter().any(|site| site.prism == key.prism));
         let all = own.iter().chain(sites);
         all.map(|site| self.key(site, chosen.is_some_and(|key| key.prism == site.prism)))
@@ -224,7 +224,8 @@ impl View<'_> {
     }
 }
 
-/// Each piece that is shown; advice where one is in several parts of the printer's bed or has one neighbour.
+/// Lists the pieces that are shown, as JSON. Adds advice for pieces that do not fit the printer or have one
+/// neighbour.
 fn told_pieces(
     figure: &Figure,
     options: &Options,
@@ -275,7 +276,7 @@ fn told_pieces(
     Ok(told.into())
 }
 
-/// The pieces that are shown, with jagged seams.
+/// Pieces as shown, with jagged seams along the triangles.
 fn as_shown(mesh: &TriMesh, shown: &[u32]) -> SegmentedSurface {
     SegmentedSurface {
         mesh: mesh.clone(),
@@ -285,7 +286,7 @@ fn as_shown(mesh: &TriMesh, shown: &[u32]) -> SegmentedSurface {
     }
 }
 
-/// A place on the piece near its middle.
+/// Centre of the piece's face that is nearest to the piece's centroid.
 fn middle(mesh: &TriMesh, faces: &[usize]) -> Vec3 {
     let (mut sum, mut area) = (Vec3::ZERO, 0.0);
     for &f in faces {
@@ -299,7 +300,7 @@ fn middle(mesh: &TriMesh, faces: &[usize]) -> Vec3 {
         .unwrap_or(mean)
 }
 
-/// How many pieces each touches along an edge.
+/// Number of pieces that each piece touches along an edge.
 fn neighbours(mesh: &TriMesh, shown: &[u32], n: usize) -> Vec<usize> {
     let mut owner = std::collections::HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
     let mut pairs = std::collections::BTreeSet::new();

@@ -1,4 +1,4 @@
-//! A project's folder: the project file, the model as it was given, the labels, and the kit that was made last.
+//! Folder of a project: the project file, the model as given, the labels, and the kit that was made last.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,39 +17,39 @@ use crate::output::PLAN;
 use crate::project::{Choice, ModelOf, Project, beside};
 use crate::stages::write;
 
-/// The project file.
+/// Name of the project file.
 const PROJECT: &str = "figure.shellock.toml";
-/// One label a face of the model's file.
+/// Name of the file of labels: one label a face of the model's file.
 const LABELS: &str = "figure.labels.seg";
-/// What came of the kit that was made last, and of what it was made.
+/// Name of the file with the result of the last kit and a hash of its inputs.
 const LAST: &str = "figure.kit.json";
-/// The folder of that kit.
+/// Name of the folder of that kit.
 const KIT: &str = "kit";
-/// Labels that pieces on the page may have, from 0. The page gives a new piece a new label, so that there are more labels
-/// than pieces.
+/// Number of labels that pieces on the page may have, from 0. The page gives a new piece a new label, so
+/// there are more labels than pieces.
 pub const N_LABELS: u32 = 8 * MOST_PIECES as u32;
-/// Longest name of a model's file that is kept, characters.
+/// Length limit of the stored name of a model's file, characters.
 const LONGEST_NAME: usize = 100;
 
-/// The folder.
+/// Project folder that the studio reads and writes.
 pub struct Store {
     folder: PathBuf,
-    /// Printers of the user's own, as their configuration has them.
+    /// The user's own printers, as their configuration declares them.
     printers: Option<Item>,
 }
 
-/// A project as it was found.
+/// Contents of a project that was found.
 #[derive(Default)]
 pub struct Found {
     pub model: Option<ModelOf>,
-    /// Pieces that they name count from 1.
+    /// Chosen options; piece numbers in them count from 1.
     pub choices: Choices,
-    /// What was painted, one a face of the file, from 0.
+    /// Painted labels, one a face of the file, from 0; `None` if nothing was painted.
     pub labels: Option<Vec<u32>>,
 }
 
 impl Store {
-    /// Makes the folder where there is none, and reads the project in it where there is one.
+    /// Creates the folder if there is none, and reads the project in it if there is one.
     pub fn open(folder: PathBuf) -> Result<(Self, Found), Failure> {
         fs::create_dir_all(&folder).map_err(Failure::unwritable(&folder))?;
         let folder = folder.canonicalize().map_err(Failure::unwritable(&folder))?;
@@ -86,17 +86,18 @@ impl Store {
         self.folder.join(PROJECT)
     }
 
-    /// The printers that the project brings along.
+    /// Printers that are stored in the project.
     pub fn printers(&self) -> Option<&Item> {
         self.printers.as_ref()
     }
 
-    /// Where the model is.
+    /// Path of the model's file.
     pub fn model_path(&self, model: &ModelOf) -> Result<PathBuf, Failure> {
         model.path(&self.folder).map_err(Failure::Wrong)
     }
 
-    /// Writes all of it: labels first, as the project file names them. In files pieces count from 1, as people do.
+    /// Saves the project: labels first, since the project file names them. In files, pieces count from 1, as
+    /// for people.
     pub fn save(
         &self,
         model: Option<&ModelOf>,
@@ -117,7 +118,7 @@ impl Store {
         write(&self.project_file(), project.to_toml().as_bytes())
     }
 
-    /// Keeps a model's file, by a name like `name` that no other file of the folder has.
+    /// Stores a model's file under a name like `name` that no other file of the folder has.
     pub fn keep(&self, name: &str, bytes: &[u8]) -> Result<ModelOf, Failure> {
         let hash = sha256(bytes);
         let is_free = |name: &str| {
@@ -134,19 +135,20 @@ impl Store {
         Ok(ModelOf { file, sha256: hash })
     }
 
-    /// What a kit is made of, as one number.
+    /// Hash of the inputs of a kit: the project file and the labels.
     pub fn state(&self) -> String {
         let bytes = |name: &str| fs::read(self.folder.join(name)).unwrap_or_default();
         sha256(&[bytes(PROJECT), bytes(LABELS)].concat())
     }
 
-    /// Notes what came of a kit that was made of `state`.
+    /// Notes the result of a kit that was made from `state`.
     pub fn note_kit(&self, state: &str, code: i32, result: &Value) -> Result<(), Failure> {
         let noted = json!({ "made_of": state, "passed": code == 0, "summary": result });
         write(&self.folder.join(LAST), noted.to_string().as_bytes())
     }
 
-    /// The kit that was made last, and whether it is of the project as it is; `null` where there is none.
+    /// Describes the last kit as JSON, and says whether it is of the project's present state; `null` if there
+    /// is none.
     pub fn kit(&self) -> Value {
         if !self.kit_folder().join(PLAN).is_file() {
             return Value::Null;
@@ -160,7 +162,7 @@ impl Store {
     }
 }
 
-/// The options that a project file sets, and whether it has labels.
+/// Options that a project file sets; also returns true if it names labels.
 fn choices_of(file: &toml_edit::DocumentMut) -> Result<(Choices, bool), String> {
     let mut choices = Choices::new();
     let mut is_labelled = false;
@@ -194,7 +196,7 @@ fn choices_of(file: &toml_edit::DocumentMut) -> Result<(Choices, bool), String> 
     Ok((choices, is_labelled))
 }
 
-/// The labels in the file at `path`, and the pieces that they become.
+/// Reads the labels in the file at `path`, and numbers the pieces that they define.
 fn labels_in(path: &Path) -> Result<(Vec<i64>, Numbering), Failure> {
     let labels = read_labels(&read(path)?).map_err(|source| Failure::NotAMesh {
         path: path.to_owned(),
@@ -211,17 +213,17 @@ fn labels_in(path: &Path) -> Result<(Vec<i64>, Numbering), Failure> {
     Ok((labels, numbering))
 }
 
-/// Numbers of pieces, from 1, for labels of a file that this program may not have written: such labels may count from 0,
-/// or be far apart.
+/// Maps labels of a file to piece numbers, from 1. The file may be from another program: its labels may count
+/// from 0 or be far apart.
 struct Numbering {
-    /// What to add to a label; `None` where labels are far apart and numbered by their places.
+    /// Offset to add to a label; `None` if labels are far apart and are numbered by rank.
     shift: Option<i64>,
-    /// The place of each label in their order, from 1.
+    /// Rank of each label, from 1.
     places: BTreeMap<i64, i64>,
 }
 
 impl Numbering {
-    /// Labels of this program keep their numbers.
+    /// Creates the numbering for these labels. Labels written by this program keep their numbers.
     fn of(labels: &[i64]) -> Self {
         let all: BTreeSet<i64> = labels.iter().copied().collect();
         let first = all.first().map_or(1, |&first| first.min(1));
@@ -232,7 +234,7 @@ impl Numbering {
         }
     }
 
-    /// The number of the piece with this label. A label that no face has is no piece's number, either.
+    /// Number of the piece with this label; a number that no piece has if no face has the label.
     fn number(&self, label: i64) -> Option<i64> {
         match self.shift {
             Some(shift) => label.checked_add(shift),
@@ -240,15 +242,15 @@ impl Numbering {
         }
     }
 
-    /// The piece of each face, from 0.
+    /// Piece of each face, from 0.
     fn pieces(&self, labels: &[i64]) -> Vec<u32> {
         let piece = |&label: &i64| self.number(label).map_or(0, |number| (number - 1) as u32);
         labels.iter().map(piece).collect()
     }
 }
 
-/// Names for a model's file: like `name`, without what file systems or projects have another use for; then with
-/// numbers.
+/// Generates names for a model's file: first like `name`, without characters and names that file systems or
+/// projects reserve, then the same with numbers.
 fn names_like(name: &str) -> impl Iterator<Item = String> {
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
     let is_plain = |c: &char| c.is_alphanumeric() || " ._-()".contains(*c);
@@ -328,7 +330,7 @@ mod tests {
         assert_eq!(fs::read(dir.path().join("a.stl")).unwrap(), b"mine");
     }
 
-    /// A folder with a project of somebody else's: these lines, and these labels.
+    /// A folder with a project from elsewhere: these lines, and these labels.
     fn project_of(lines: &str, labels: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         fs::write(
@@ -340,7 +342,7 @@ mod tests {
         dir
     }
 
-    /// For each option that may name a label, the faces that have it, or else its own words.
+    /// For each option that may name a label: the faces that have the label, or else the option's own text.
     fn meaning(folder: &Path) -> Vec<String> {
         let labels = read_labels(&fs::read(folder.join(LABELS)).unwrap()).unwrap();
         let faces = |text: String| match text.parse::<i64>() {

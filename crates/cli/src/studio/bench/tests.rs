@@ -4,7 +4,7 @@ use super::*;
 use shellock_formats::{read_labels, write_ply};
 use shellock_testkit::shapes::torus;
 
-/// The key of the project as it is saved, and the labels that are saved with it.
+/// Saved key of the project, and the labels saved with it.
 fn saved(bench: &Bench) -> (String, Option<Vec<i64>>) {
     let file: toml::Table = std::fs::read_to_string(bench.store.project_file())
         .unwrap()
