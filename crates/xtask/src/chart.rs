@@ -16,7 +16,7 @@ const TEXT_PX: i32 = 16;
 const LINE_PX: u32 = 2;
 /// Empty space around the data, as a share of its range.
 const PADDING: f64 = 0.05;
-/// Tells apart for most colour-blind readers, on white. [Okabe and Ito 2008], without yellow.
+/// Colours that most colour-blind readers can distinguish, on white. [Okabe and Ito 2008], without yellow.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -27,47 +27,47 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 
-/// What stands at the chart's edges.
+/// Texts at the chart's edges.
 pub struct Labels<'a> {
-    /// Above.
+    /// Title above the chart.
     pub title: &'a str,
-    /// Below, with the unit.
+    /// Label below the chart, with the unit.
     pub x: &'a str,
-    /// On the left, with the unit.
+    /// Label on the left, with the unit.
     pub y: &'a str,
 }
 
-/// A named run of points with their range over seeds.
+/// A named series of points with their range over seeds.
 pub struct Curve<'a> {
-    /// In the legend.
+    /// Name in the legend.
     pub name: &'a str,
-    /// In order of x.
+    /// Points in order of x.
     pub points: Vec<BandPoint>,
 }
 
-/// Where the legend stands.
+/// Position of the legend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corner {
-    /// For curves that rise.
+    /// Lower right, for curves that rise.
     LowerRight,
-    /// For curves that fall.
+    /// Upper right, for curves that fall.
     UpperRight,
 }
 
-/// A named value known to lie between two bounds.
+/// A named value that lies between two known bounds.
 pub struct Interval {
-    /// On the left of its line.
+    /// Name, on the left of the line.
     pub name: String,
-    /// No more is proven.
+    /// Proven lower bound of the value.
     pub low: f64,
-    /// Reached.
+    /// Best value that was reached.
     pub high: f64,
 }
 
 type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Drawn = Result<(), Box<dyn Error>>;
 
-/// One dot a pair (`x[i]`, `y[i]`); both rank correlations in the title.
+/// Scatter plot with a dot for each pair (`x[i]`, `y[i]`). The title gives both rank correlations.
 pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Failure> {
     let say = |r: Option<f64>| r.map_or("undefined".to_owned(), |r| format!("{r:.2}"));
     let title = format!(
@@ -97,8 +97,8 @@ pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Fail
     )
 }
 
-/// A line through the medians of each curve in a band from least to greatest; `optimum`, where known, as a
-/// dashed line.
+/// Line through the medians of each curve, in a band from least to greatest; `optimum`, if known, is a dashed
+/// line.
 pub fn bands(
     labels: &Labels<'_>,
     curves: &[Curve<'_>],
@@ -134,7 +134,7 @@ pub fn bands(
     })
 }
 
-/// Each column scaled to [0, 1], over the rows sorted by the first column (Fig. 12 and 13).
+/// Curves of columns, each scaled to [0, 1], over the rows sorted by the first column (Fig. 12 and 13).
 pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<String, Failure> {
     let order = columns.first().map_or_else(Vec::new, |(_, first)| {
         let mut order: Vec<usize> = (0..first.len()).collect();
@@ -147,7 +147,7 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
         -PADDING..1.0 + PADDING,
         Some(Corner::LowerRight.into()),
         |plane| {
-            // The first, which all others are to follow, is drawn last and so on top.
+            // The first column, which the others should follow, is drawn last and so on top.
             for (i, (name, values)) in columns.iter().enumerate().rev() {
                 let values = normalised(values);
                 let line = order
@@ -161,7 +161,7 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
     )
 }
 
-/// One line an interval, in their order from above, with a dot where the value was reached.
+/// One line for each interval, in their order from the top, with a dot at the value that was reached.
 pub fn intervals(labels: &Labels<'_>, intervals: &[Interval]) -> Result<String, Failure> {
     let n = intervals.len() as f64;
     let most = intervals.iter().map(|i| i.high).fold(0.0, f64::max);
@@ -196,7 +196,7 @@ impl From<Corner> for SeriesLabelPosition {
     }
 }
 
-/// What holds from one point to the next, as corners of a staircase.
+/// Corners of a staircase on which each value holds until the next point.
 fn as_steps(points: &[BandPoint]) -> Vec<BandPoint> {
     let corner = |w: &[BandPoint]| [w[0], BandPoint { x: w[1].x, ..w[0] }];
     points
@@ -215,7 +215,7 @@ fn draw_line(plane: &mut Plane<'_, '_>, name: &str, points: Vec<(f64, f64)>, col
     Ok(())
 }
 
-/// The chart that `draw` fills, with a legend at `legend` if there is one.
+/// Chart that `draw` fills, as SVG, with a legend at `legend` if given.
 fn svg(
     labels: &Labels<'_>,
     x: Range<f64>,
@@ -268,7 +268,7 @@ fn svg(
     }
 }
 
-/// Three digits, with an exponent where there would be many zeros.
+/// Number with three digits, and an exponent if there would be many zeros.
 fn tick(value: &f64) -> String {
     let size = value.abs();
     match size {
@@ -294,7 +294,7 @@ fn padded(values: impl Iterator<Item = f64>) -> Range<f64> {
     widened(low - padding, high + padding)
 }
 
-/// The range, or one around it where it is empty: a chart needs some width.
+/// Range from `low` to `high`, widened if it is empty or not finite, because a chart needs some width.
 fn widened(low: f64, high: f64) -> Range<f64> {
     match (low.is_finite() && high.is_finite(), low < high) {
         (false, _) => 0.0..1.0,

@@ -1,4 +1,4 @@
-//! Curves of how searches get better with work, as charts and tables (Fig. 14 and 16).
+//! Curves of how searches improve with work, as charts and tables (Fig. 14 and 16).
 
 use shellock::plan::study::{Technique, convergence};
 use shellock::plan::{PlanParams, PlanSurvey};
@@ -10,10 +10,10 @@ use crate::statistics::band;
 use crate::study::Sheet;
 use crate::table::{Table, markdown};
 
-/// Runs of one search with several seeds: of each the improvements (evaluations, cost).
+/// Runs of one search with several seeds: for each, its improvements (evaluations, cost).
 pub type Runs = Vec<Vec<(f64, f64)>>;
 
-/// One run a seed of `n_evaluations` each; a run is empty where no key has a plan.
+/// Runs the search once for each seed with `n_evaluations` each. A run is empty if no key has a plan.
 pub fn runs(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -36,8 +36,8 @@ pub fn runs(
     seeds.map(run).collect()
 }
 
-/// Chart and tables of several searches, each named, with their runs: `file`.svg, .csv and .md. `optimum`, where
-/// proven, is a line of the chart.
+/// Chart and tables of several named searches with their runs: `file`.svg, .csv and .md. A proven `optimum`
+/// becomes a line of the chart.
 pub fn convergence_sheets(
     file: &str,
     title: &str,

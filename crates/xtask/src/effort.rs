@@ -1,4 +1,4 @@
-//! What kits of many models cost: time by stage, kits made in vain, how it ended. Runs the program itself.
+//! Effort for kits of many models: time by stage, rejected kits, and outcome. Runs the program itself.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -45,10 +45,10 @@ pub struct EffortOptions {
     options: Vec<String>,
 }
 
-/// What one job came to.
+/// Result of one job.
 struct Run {
     name: String,
-    /// `None` where it was given up.
+    /// Exit code; `None` if the job was stopped for its time or by a signal.
     exit_code: Option<i32>,
     seconds: f64,
     cpu_seconds: f64,
@@ -56,13 +56,13 @@ struct Run {
     /// Processor seconds of each stage, largest first.
     stages: Vec<(String, f64)>,
     kits: Option<u64>,
-    /// The last line that it said.
+    /// Outcome in words: status, failed checks, or error.
     last: String,
-    /// Why kits and divisions were given up.
+    /// Notes of the program, such as why kits and divisions were rejected.
     notes: Vec<String>,
 }
 
-/// Runs all jobs; returns the table's file.
+/// Runs all jobs; returns the file of the table.
 pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> {
     let folder = out.join("effort");
     let mut models = Vec::new();
@@ -80,7 +80,7 @@ pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure>
         .num_threads(options.jobs.max(1))
         .build()
         .expect("threads can be made");
-    // Lines come as jobs end.
+    // Each line is printed when its job ends.
     let said = Mutex::new(());
     let runs: Result<Vec<Run>, Failure> = pool.install(|| {
         jobs.par_iter()
@@ -95,7 +95,7 @@ pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure>
     write_all(out, "effort", &[("effort.md".into(), text(&runs?))])
 }
 
-/// A model, or those in a folder, by name.
+/// Returns the path of a model itself, or the models in a folder, sorted by name.
 fn models_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     const ENDINGS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
     if !path.is_dir() {
@@ -117,7 +117,7 @@ fn models_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(models)
 }
 
-/// The hard family as files.
+/// Writes the hard family as files and returns their paths.
 fn written(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let wrong = |path: &Path| {
         let path = path.to_owned();
@@ -134,7 +134,7 @@ fn written(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         .collect()
 }
 
-/// One job, watched until it ends or its time is up.
+/// Runs one job and watches it until it ends or its time is up.
 fn one(options: &EffortOptions, folder: &Path, model: &Path, size_mm: f64) -> Result<Run, Failure> {
     let stem = model
         .file_stem()
@@ -189,7 +189,7 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_default()
 }
 
-/// The most that a process ever had, MB, where the system tells it.
+/// Peak memory of a process, MB; 0 if the system does not report it.
 fn resident_mb(pid: u32) -> f64 {
     let status = read(Path::new(&format!("/proc/{pid}/status")));
     let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
@@ -197,7 +197,7 @@ fn resident_mb(pid: u32) -> f64 {
     kb.unwrap_or(0.0) / 1024.0
 }
 
-/// What the program said of a job.
+/// Reads the results of a job from the program's answer and events.
 fn told(answer: &str, events: &str) -> Run {
     let answer: Value = answer.lines().last().map_or(Value::Null, json);
     let events: Vec<Value> = events.lines().map(json).collect();
@@ -240,7 +240,7 @@ fn json(line: &str) -> Value {
     serde_json::from_str(line).unwrap_or(Value::Null)
 }
 
-/// What the table has of a job.
+/// Cells of a job's row in the table.
 fn line(run: &Run) -> Vec<String> {
     const LONGEST: usize = 90;
     let stages: Vec<String> = run
@@ -263,7 +263,7 @@ fn line(run: &Run) -> Vec<String> {
     ]
 }
 
-/// The table, its sums, and what each job noted.
+/// Table of all jobs, its sums, and the notes of each job.
 fn text(runs: &[Run]) -> String {
     const HEAD: [&str; 8] = [
         "model",

@@ -1,70 +1,70 @@
-//! Why a study ended without its charts.
+//! Reasons why a study ended without its charts.
 
 use std::path::PathBuf;
 
 use shellock::params::ParamProblem;
 
-/// One line for a person.
+/// Failure of a task, as one line for people.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// A file could not be read or written.
     #[error("{path}: {source}", path = path.display())]
     File {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A table does not have what the study needs.
+    /// A table lacks what the study needs.
     #[error("{path}: {problem}", path = path.display())]
     Table {
-        /// Which file.
+        /// Path of the table.
         path: PathBuf,
-        /// What is missing, and where.
+        /// Missing part, and its place.
         problem: String,
     },
-    /// Options out of their ranges.
+    /// Some options are out of their ranges.
     #[error("{}", .0.join("; "))]
     Options(Vec<String>),
     /// A model cannot be studied.
     #[error("{path}: {problem}", path = path.display())]
     Model {
-        /// Its file, or that of its labels.
+        /// Path of its file, or of its labels.
         path: PathBuf,
-        /// Why not.
+        /// Reason why the model cannot be studied.
         problem: String,
     },
     /// The program could not be built or run.
     #[error("{program}: {problem}")]
     Program {
-        /// Which.
+        /// Name of the program.
         program: String,
-        /// What it says.
+        /// Error message in words.
         problem: String,
     },
-    /// The program no longer writes or says what it did.
+    /// The program's output differs from the goldens.
     #[error("other than before: {}", .0.join("; "))]
     Changed(Vec<String>),
-    /// What a metric computes once for all plans could not be computed.
+    /// The part of a metric that all plans share could not be computed.
     #[error("{metric}: {problem}")]
     Metric {
-        /// Its name.
+        /// Name of the metric.
         metric: String,
-        /// What it says.
+        /// Error message in words.
         problem: String,
     },
-    /// The drawing library refused.
+    /// The drawing library reported an error.
     #[error("cannot draw the chart \"{title}\": {problem}")]
     Chart {
-        /// The chart's title.
+        /// Title of the chart.
         title: String,
-        /// What it says.
+        /// Error message in words.
         problem: String,
     },
 }
 
 impl Failure {
-    /// Refuses options that have `problems`.
+    /// Fails if there are any `problems` with the options.
     pub fn unless_right(problems: impl IntoIterator<Item = ParamProblem>) -> Result<(), Self> {
         let problems: Vec<String> = problems.into_iter().map(|p| p.to_string()).collect();
         if problems.is_empty() {

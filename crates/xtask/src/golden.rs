@@ -1,4 +1,4 @@
-//! Goldens of the figures that come with the program, and of models from elsewhere where they are.
+//! Goldens: digests of kits of the program's own figures, and of models from elsewhere if they are present.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,7 +31,7 @@ pub struct Options {
     threads: Vec<usize>,
 }
 
-/// Compares, or writes anew; returns the files written.
+/// Compares with the goldens, or rewrites them; returns the files written.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     let program = options.program.clone().map_or_else(built, Ok)?;
     let mut changes = Vec::new();
@@ -70,7 +70,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// Runs all cases that were asked for; `changes` collects what is other than in the file.
+/// Runs all selected cases. `changes` collects the differences from the goldens in `file`.
 fn suite(
     options: &Options,
     program: &Path,
@@ -129,7 +129,7 @@ fn suite(
     Ok(Some(file.to_owned()))
 }
 
-/// The ending of a case, which must be the same on any number of threads.
+/// Runs a case on each number of threads; its ending must be the same on all.
 fn on_threads(
     options: &Options,
     program: &Path,
@@ -154,7 +154,7 @@ fn on_threads(
     first.ok_or_else(|| Failure::Options(vec!["--threads names none".into()]))
 }
 
-/// The program, built from what is here.
+/// Builds the program from this source tree and returns its path.
 fn built() -> Result<PathBuf, Failure> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let failed = |problem: String| Failure::Program {

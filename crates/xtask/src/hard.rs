@@ -1,21 +1,21 @@
-//! Models that are hard to make kits of, by code: walls of their own, holes through them, thin limbs.
+//! Generated models that are hard to make kits of: with walls of their own, with holes, with thin limbs.
 
 use std::f64::consts::TAU;
 
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
-/// Corners of round things.
+/// Number of corners of a circle.
 const N_ROUND: usize = 64;
 
-/// A model and what it is called.
+/// A model and its name.
 pub struct Hard {
-    /// Without extension.
+    /// File name without extension.
     pub name: String,
-    /// About 150 mm large, closed, z up.
+    /// Closed mesh, about 150 mm large, z up.
     pub mesh: TriMesh,
 }
 
-/// All of them.
+/// Generates all models of the family.
 pub fn family() -> Vec<Hard> {
     let mut all = Vec::new();
     let mut add = |name: String, volume: Volume| {
@@ -53,7 +53,7 @@ fn circle(radius_mm: f64, z: f64) -> Vec<Vec3> {
         .collect()
 }
 
-/// Of radius and height, from below.
+/// Solid of revolution about z; `profile` gives radius and height, mm, from below.
 fn turned(profile: &[[f64; 2]]) -> Volume {
     Volume::loft(&profile.iter().map(|&[r, z]| circle(r, z)).collect::<Vec<_>>())
 }
@@ -65,7 +65,7 @@ fn block(min: [f64; 3], max: [f64; 3]) -> Volume {
     })
 }
 
-/// A round rod whose radius goes from one to the other.
+/// Round rod whose radius, mm, changes linearly from one end to the other.
 fn rod(from: Vec3, to: Vec3, radii_mm: [f64; 2]) -> Volume {
     let (u, v) = (to - from).normalize().any_orthonormal_pair();
     let ring = |at: Vec3, r: f64| {
@@ -112,7 +112,7 @@ fn goblet(wall_mm: f64) -> Volume {
     turned(&outer).subtract(&turned(&inner))
 }
 
-/// A solid cup with a foot, whose belly stands out by so much over its neck, and two round handles.
+/// Solid cup with a foot, a belly that bulges over its neck by `bulge_mm`, and two round handles.
 fn two_handled_cup(bulge_mm: f64) -> Volume {
     let body = [
         [26.0, 0.0],
@@ -129,7 +129,7 @@ fn two_handled_cup(bulge_mm: f64) -> Volume {
     Volume::union_all([turned(&body)].into_iter().chain(handles).collect())
 }
 
-/// A round ring that stands upright, facing along y.
+/// Round ring that stands upright, with its axis along y.
 fn ring(center: Vec3, radius_mm: f64, tube_mm: f64) -> Volume {
     let section = |i: usize| {
         let (sin, cos) = (TAU * i as f64 / N_ROUND as f64).sin_cos();

@@ -1,7 +1,9 @@
-//! How well the closed forms foretell what PrusaSlicer tells of prints by filament, and what coefficients fit.
+//! Accuracy of the closed forms for filament prints against PrusaSlicer's estimates, and the coefficients
+//! that fit best.
 //!
-//! Kits are compared by plates, and their whole models. With `--pieces` every piece is sliced alone in three
-//! poses, with and without supports, and the coefficients of `print::time` are found by least squares.
+//! Kits are compared plate by plate, and so are their whole models. With `--pieces` every piece is sliced
+//! alone in three poses, with and without supports, and the coefficients of `print::time` are found by least
+//! squares.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,12 +23,12 @@ use crate::failure::Failure;
 use crate::study::write_all;
 use crate::table::markdown;
 
-/// A face is part of the outer skin where its middle is so near to the model's surface, mm.
+/// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
 const SKIN_MM: f64 = 0.05;
-/// How many of a form's features are of the piece itself; the rest are of its supports.
+/// Number of a form's features that belong to the piece itself; the rest belong to its supports.
 const N_OWN_TIME: usize = 4;
 const N_OWN_PLASTIC: usize = 3;
-/// PrusaSlicer's defaults but for these; the bed holds everything.
+/// Settings that differ from PrusaSlicer's defaults; the bed holds everything.
 const SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nskirts = 0\nperimeters = 2\n\
     fill_density = 15%\nlayer_height = 0.2\nfirst_layer_height = 0.2\n\
     bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
@@ -61,7 +63,7 @@ pub fn run(options: &HoursOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
     write_all(out, "hours", &[(name.to_owned(), text)])
 }
 
-/// Pieces of a kit and its whole model.
+/// Pieces of a kit, and its whole model.
 struct Kit {
     pieces: Vec<TriMesh>,
     whole: TriMesh,
@@ -79,7 +81,7 @@ impl Kit {
                 path: path.clone(),
                 problem: e.to_string(),
             })?;
-            // Slicers want triangles that share their points.
+            // Slicers need triangles that share their points.
             Ok(weld(&loaded.mesh).mesh)
         };
         let pieces = folder.join("pieces");
@@ -100,7 +102,7 @@ impl Kit {
     }
 }
 
-/// A row a kit: estimate and slicer, and what the slicer says of the kit over its whole model.
+/// One row for each kit: estimate and slicer, and the slicer's ratio of the kit to its whole model.
 fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
     let printer = Printer::fdm();
     let mut rows = Vec::new();
@@ -193,14 +195,14 @@ fn object(mesh: &TriMesh, turned: [[f64; 3]; 3], moved_mm: [f64; 3]) -> NamedObj
     }
 }
 
-/// What the slicer says of one print, and the amounts of the closed forms.
+/// Costs of one print by the slicer, without and with supports, and the amounts that the closed forms use.
 struct Sample {
     load: Load,
     without: Cost,
     with: Cost,
 }
 
-/// Coefficients for the piece itself and for its supports, and how far they are off.
+/// Fits coefficients for the piece itself and for its supports, and reports their errors.
 fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
     let printer = Printer::fdm();
     let mut samples = Vec::new();
@@ -222,7 +224,8 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
                     turned,
                     [100.0 - least(x), 100.0 - least(y), -least(up)],
                 )];
-                // What stands on a point has no first layer and is not sliced.
+                // A print that touches the bed in one point only has no first layer, and the slicer refuses
+                // it.
                 if let (Ok(with), Ok(without)) = (
                     slicer.cost(&printer, &print, true),
                     slicer.cost(&printer, &print, false),
@@ -282,7 +285,7 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
     ))
 }
 
-/// What is to be fitted: errors count as shares of `of`.
+/// One equation of the fit; errors count as shares of `of`.
 struct Fitted {
     amounts: Vec<f64>,
     told: f64,
@@ -317,9 +320,9 @@ fn estimate(fitted: &Fitted, prices: &[f64]) -> f64 {
         .sum()
 }
 
-/// Prices, none below zero, with the least sum of squared errors: one after the other, until they rest.
+/// Non-negative prices with the least sum of squared errors, by coordinate descent.
 fn least_squares(fitted: &[Fitted]) -> Vec<f64> {
-    /// They rest within some hundred rounds.
+    /// Number of rounds: prices converge within some hundred.
     const ROUNDS: usize = 20_000;
     let n = fitted.first().map_or(0, |f| f.amounts.len());
     let sum = |term: &dyn Fn(&Fitted) -> f64| fitted.iter().map(|f| term(f) / (f.of * f.of)).sum::<f64>();
@@ -345,7 +348,7 @@ struct Slicer {
 }
 
 impl Slicer {
-    /// What it says of a print.
+    /// Slices a print and reads the slicer's estimate of its cost.
     fn cost(&self, printer: &Printer, objects: &[NamedObject<'_>], supports: bool) -> Result<Cost, Failure> {
         let [model, settings, out] = ["job.3mf", "job.ini", "job.gcode"].map(|name| self.folder.join(name));
         let text = format!("{SETTINGS}support_material = {}\n", u8::from(supports));
@@ -394,7 +397,7 @@ impl Slicer {
     }
 }
 
-/// "1d 2h 3m 4s" in seconds.
+/// Parses a time such as "1d 2h 3m 4s" into seconds; words that are no time count as 0.
 fn seconds_in(text: &str) -> f64 {
     let seconds = |word: &str| {
         let (number, unit) = word.split_at(word.len() - 1);

@@ -1,4 +1,4 @@
-//! What random plans of a model bear by the surface model and by the solid one, load by load.
+//! Load factors of a model's random plans by the surface model and by the solid model, load by load.
 
 mod gain;
 
@@ -45,11 +45,11 @@ pub struct LoadsOptions {
 struct Row {
     case: LoadCase,
     surface: Vec<f64>,
-    /// The stations that decide.
+    /// Stations that fail first, with the way in which each plan fails.
     stations: Vec<Option<(Way, u32)>>,
-    /// Not a number where the solid model was not asked.
+    /// Load factors by the solid model; NaN if it was not run.
     solid: Vec<f64>,
-    /// How it gives way by the solid model.
+    /// Ways in which the plans fail, by the solid model.
     ways: Vec<Way>,
 }
 
@@ -72,7 +72,7 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     write_all(out, &format!("{}/loads", options.subject.model.name()), &sheets)
 }
 
-/// All load factors, and how well the two models agree.
+/// Tables of all load factors, and of the agreement of the two models.
 fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
     let least = |of: fn(&Row) -> &Vec<f64>| -> Vec<f64> {
         let plan = |i: usize| rows.iter().map(|r| of(r)[i]).fold(f64::INFINITY, f64::min);
@@ -90,7 +90,7 @@ fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
         "ρ with solid",
     ];
     let both = |r: &Row| {
-        // No comma may be in the name of a column.
+        // The name of a column must not contain a comma.
         let name = deed(&r.case.deed).replace(',', "");
         [
             (format!("{name} surface"), r.surface.clone()),
@@ -170,7 +170,7 @@ fn by_solid(subject: &Subject, rows: &mut [Row]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a plan bears of each load by the solid model.
+/// Load factor of a plan under each load, and how it fails, by the solid model.
 fn factors(
     model: &VolumeModel,
     plan: &[Meeting],
@@ -232,7 +232,7 @@ fn quantiles(values: &[f64]) -> [f64; 3] {
     [at(0.0), at(0.5), at(1.0)]
 }
 
-/// In words.
+/// Describes a deed in words.
 fn deed(deed: &Deed) -> String {
     let way = |d: &[f64; 3]| format!("{:.1} {:.1} {:.1}", d[0], d[1], d[2]);
     match deed {

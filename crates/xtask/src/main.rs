@@ -1,4 +1,4 @@
-//! Tools for working on Shellock that are no part of it: studies of its metrics and searches, as charts and
+//! Tools for working on Shellock that are not part of it: studies of its metrics and searches as charts and
 //! tables, goldens, and the pictures of its documentation.
 //!
 //! `cargo xtask --help` lists them.

@@ -1,4 +1,4 @@
-//! How well the metrics agree on random plans of one model (Fig. 12), and how little their stiffness matters
+//! Agreement of the metrics on random plans of one model (Fig. 12), and their low sensitivity to stiffness
 //! (Fig. 13).
 
 mod column;
@@ -20,7 +20,7 @@ use crate::table::Table;
 use column::Column;
 pub use column::failed;
 
-/// Plans on which linearity in Young's modulus is tested.
+/// Number of plans on which linearity in Young's modulus is tested.
 const N_LINEAR: usize = 3;
 
 /// Which plans of which model.
@@ -43,18 +43,18 @@ pub struct SubjectOptions {
     pub edge_share: f64,
 }
 
-/// The plans and what the metrics know of them.
+/// Random plans of a model, with the data that the metrics need.
 pub struct Subject {
     pub model: PlanModel,
     pub survey: PlanSurvey,
     pub plans: Vec<LatticePlan>,
-    /// What each plan makes of the stations.
+    /// Meetings of each plan: its walls and connectors at the stations.
     pub meetings: Vec<Vec<Meeting>>,
     pub key: u32,
 }
 
-/// Every metric that is compared: all with the first, and those after the second with that, too. A new metric
-/// is one line here.
+/// Columns of all compared metrics. All are compared with the first, and those after the second also with the
+/// second. A new metric is one line here.
 fn columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     let e_mpa = subject.model.params.material.youngs_modulus_mpa;
     Ok(vec![
@@ -67,7 +67,7 @@ fn columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     ])
 }
 
-/// Fig. 13's other stiffnesses of the surface metric, as stretch : bending : position.
+/// Columns of the surface metric with Fig. 13's other stiffnesses, as stretch : bending : position.
 fn stiffness_columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     Ok(vec![
         Column::by_surface("surface 1:4:16 [mm]", subject, [1.0, 4.0, 16.0])?,
@@ -86,7 +86,7 @@ pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBu
     let table = table(columns.iter().chain(&stiffness));
     let compared = agreement(&self::table(&columns).complete())?;
     let by_surface = agreement(&self::table(&columns[1..]).complete())?;
-    // The same metric with other stiffnesses, compared with itself.
+    // This compares the surface metric with itself, at other stiffnesses.
     let surface = columns
         .iter()
         .filter(|c| c.name.starts_with("surface"))
@@ -109,10 +109,10 @@ pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBu
     Ok(files)
 }
 
-/// Divides the model and draws the plans.
+/// Divides the model and draws the random plans.
 pub fn subject(options: &SubjectOptions) -> Result<Subject, Failure> {
     let path = &options.model.model;
-    // Before the model is divided, which takes its time.
+    // Wrong parameters should fail before the model is divided, which takes time.
     let metric = MetricParams {
         edge_share: options.edge_share,
         ..MetricParams::default()
@@ -149,8 +149,8 @@ pub fn subject(options: &SubjectOptions) -> Result<Subject, Failure> {
     })
 }
 
-/// Openings are proportional to 1/E: the largest relative deviation from that with half and twice the
-/// stiffness.
+/// Tests that openings are proportional to 1/E. Returns the largest relative deviation at half and at twice
+/// the stiffness; `None` if no plan could be compared.
 fn linearity(subject: &Subject, reference: &Column) -> Result<Option<f64>, Failure> {
     let e_mpa = subject.model.params.material.youngs_modulus_mpa;
     let n = subject.plans.len().min(N_LINEAR);
@@ -166,7 +166,7 @@ fn linearity(subject: &Subject, reference: &Column) -> Result<Option<f64>, Failu
     Ok(largest)
 }
 
-/// The qualities as a table.
+/// Table of the columns' qualities.
 fn table<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Table {
     Table {
         columns: columns

@@ -1,4 +1,4 @@
-//! From a file to what is studied: a segmented surface and the survey of it.
+//! Prepares a model for studies: reads it, divides it and surveys its pieces.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ pub enum Axis {
 }
 
 impl ModelOptions {
-    /// The product's own parameters, but for the seeds and the axis that points up.
+    /// Parameters of the product, except for the seed and the up axis.
     pub fn params(&self) -> Params {
         let mut params = Params::default();
         params.seed = self.seed;
@@ -57,7 +57,7 @@ impl ModelOptions {
         params
     }
 
-    /// The model's name in titles and folders.
+    /// Name of the model in titles and folders.
     pub fn name(&self) -> String {
         self.model
             .file_stem()
@@ -67,23 +67,23 @@ impl ModelOptions {
 
 /// A model in mm, with the user's labels.
 pub struct Model {
-    /// The file's mesh, scaled.
+    /// Mesh of the file, scaled.
     pub solid: Solid,
-    /// One a face of `solid`, where there are any.
+    /// Labels, one a face of `solid`, if there are any.
     pub labels: Option<Vec<i64>>,
 }
 
-/// A model in pieces.
+/// A model that has been divided into pieces.
 pub struct Divided {
-    /// The pieces.
+    /// Surface with its patches.
     pub surface: SegmentedSurface,
-    /// Connector sizes of the pairs.
+    /// Connector size of each pair of pieces.
     pub sizes: ConnectorSizes,
-    /// What planning knows of them.
+    /// Survey of the pieces for planning.
     pub survey: PlanSurvey,
 }
 
-/// A number of things that there must be at least one of.
+/// Parses a whole number from 1 on.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("there must be at least one".to_owned()),
@@ -92,7 +92,7 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Reads the model and its labels.
+/// Reads the model and its labels, and scales the mesh to the requested length of its longest side.
 pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
     Failure::unless_right(ParamProblem::unless_within(
         "size",
@@ -162,7 +162,7 @@ pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Res
     })
 }
 
-/// Calls `work` with a context that tells stages on stderr and never stops.
+/// Calls `work` with a context that prints stages on standard error and never stops.
 pub fn with_ctx<T>(work: impl FnOnce(&Ctx<'_>) -> T) -> T {
     let stop = AtomicBool::new(false);
     let report = |progress: Progress<'_>| {

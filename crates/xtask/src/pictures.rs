@@ -1,6 +1,6 @@
-//! The pictures of the documentation, made by the program from a kit of its own: `cargo xtask pictures`.
+//! Pictures of the documentation, made by the program from its own kits: `cargo xtask pictures`.
 //!
-//! All of the kit is the squirrel of `shellock demo`. Nothing is drawn by hand: sections come from the
+//! All kits are of the squirrel of `shellock demo`. Nothing is drawn by hand: sections come from the
 //! functions that make connectors, stills from finished meshes.
 
 mod assembly;
@@ -34,13 +34,13 @@ pub struct Options {
     root: PathBuf,
 }
 
-/// A picture: its file, and how its bytes are made.
+/// A picture: its file, and the function that makes its bytes.
 struct Picture {
     file: &'static str,
     make: fn(&Source) -> Result<Vec<u8>, Failure>,
 }
 
-/// Where pictures come from; the kit is made when it is first asked for.
+/// Source of the pictures; the kit is made at its first use.
 #[derive(Default)]
 struct Source(OnceCell<Kit>);
 
@@ -121,7 +121,7 @@ const PICTURES: [Picture; 16] = [
     },
 ];
 
-/// Makes the pictures; returns their files.
+/// Makes the selected pictures; returns their files.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     let is_asked = |picture: &&Picture| {
         let words = options.only.as_deref().unwrap_or_default();
@@ -162,7 +162,7 @@ mod tests {
 
     use super::*;
 
-    /// All pictures together, and each, bytes.
+    /// Size limits of all pictures together, and of each, bytes.
     const MOST_IN_ALL: u64 = 1_500_000;
     const MOST_EACH: u64 = 150_000;
 
@@ -170,7 +170,7 @@ mod tests {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
     }
 
-    /// The texts that may show pictures.
+    /// Texts that may show pictures, joined.
     fn texts() -> String {
         let in_folder = |folder: &str| {
             fs::read_dir(root().join(folder))

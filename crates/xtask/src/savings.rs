@@ -1,4 +1,4 @@
-//! The paper's Table 1 of our own kits: what they save over solid models.
+//! The paper's Table 1 for our own kits: their savings over solid models.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! How fast the search gets better (Fig. 14), and what different segmentations of a model allow (Fig. 16).
+//! Convergence of the search (Fig. 14), and the best plans of different segmentations of a model (Fig. 16).
 
 use std::path::{Path, PathBuf};
 
@@ -34,11 +34,11 @@ pub struct SearchOptions {
     segmentations: usize,
 }
 
-/// A divided model, and the best plan that is known.
+/// A divided model and its best known plan.
 struct Subject {
     name: String,
     divided: Divided,
-    /// Fixed to the key of the best plan, so that all searches look for the same.
+    /// Parameters with the key of the best plan, so that all searches look for plans with the same key.
     params: PlanParams,
     best: Box<FoundPlan>,
 }
@@ -97,7 +97,7 @@ fn subject(
         {
             params.occlusion_tolerance = params.relaxed_tolerance;
         }
-        // Once more with the key given, as the searches will be run.
+        // The second search has the key fixed, as the compared searches will.
         if params.key.replace(best.plan.key()).is_some() {
             break best;
         }
@@ -114,7 +114,7 @@ fn subject(
     })
 }
 
-/// Fig. 14a: the four techniques on one segmentation.
+/// Fig. 14a: compares the four techniques on one segmentation.
 fn of_techniques(
     ctx: &Ctx<'_>,
     options: &SearchOptions,
@@ -136,7 +136,7 @@ fn of_techniques(
     convergence_sheets("techniques", &title, &runs, optimum)
 }
 
-/// Fig. 14b: both techniques on segmentations into more and more pieces.
+/// Fig. 14b: runs both techniques together on segmentations into more and more pieces.
 fn of_sizes(
     ctx: &Ctx<'_>,
     options: &SearchOptions,
@@ -161,7 +161,7 @@ fn of_sizes(
     convergence_sheets("sizes", &title, &runs, None)
 }
 
-/// Fig. 16: the best plan of each segmentation.
+/// Fig. 16: finds the best plan of each segmentation.
 fn of_segmentations(
     ctx: &Ctx<'_>,
     options: &SearchOptions,
@@ -178,7 +178,7 @@ fn of_segmentations(
         let subject = match subject(ctx, options, model, options.pieces.first().copied(), seed) {
             Ok(subject) => subject,
             Err(failure) => {
-                // No plan is an answer: it says that this segmentation does not do.
+                // Finding no plan is a result, too: this segmentation has none.
                 rows.push(vec![
                     seed.to_string(),
                     String::new(),
@@ -227,7 +227,7 @@ fn of_segmentations(
     ])
 }
 
-/// The runs of a technique on `subject`.
+/// Runs a technique on `subject`, once for each seed.
 fn runs_of(
     ctx: &Ctx<'_>,
     options: &SearchOptions,

@@ -1,4 +1,4 @@
-//! What each method's division of a model allows (Fig. 16): where its seams run, and the plans of it.
+//! Divisions of a model by each method (Fig. 16): the place of their seams, and the quality of their plans.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,7 +35,7 @@ pub struct SegmentationsOptions {
     evaluations: usize,
 }
 
-/// One division of the model, or why there is none.
+/// One division of the model, or the reason why there is none.
 struct Row {
     method: Method,
     asked: Option<usize>,
@@ -43,23 +43,24 @@ struct Row {
     made: Result<Made, String>,
 }
 
-/// A division, and its best plan or why there is none.
+/// A division with its best plan, or the reason why it has none.
 struct Made {
     figures: DivisionFigures,
     plan: Result<Plan, String>,
 }
 
-/// What the plans of a division are worth.
+/// Quality of the plans of a division.
 struct Plan {
-    /// Of the best plan that was found.
+    /// Cost of the best plan that was found.
     cost: f64,
     lower_bound: f64,
-    /// How far the loosest piece of the steadiest plan is foreseen to go, as a share of what it may.
+    /// Predicted play of the loosest piece except the key, in the steadiest plan, as a share of the allowed
+    /// play.
     play: f64,
-    /// How many times the plan bears the use it bears least that is climbed to from the steady ones, with nothing made
-    /// thicker or larger for it.
+    /// Least load factor of uses for the plan that a climb from the steady plans ends at, with unchanged
+    /// walls and connectors.
     least_use: Option<f64>,
-    /// How the best cost falls with work.
+    /// Runs that show how the best cost falls with work.
     runs: Runs,
 }
 
@@ -84,7 +85,7 @@ pub fn run(options: &SegmentationsOptions, out: &Path) -> Result<Vec<PathBuf>, F
     })
 }
 
-/// Chart and tables of how fast plans of each division get better.
+/// Chart and tables that show how fast plans of each division improve.
 fn curves(
     name: &str,
     options: &SegmentationsOptions,
@@ -192,7 +193,7 @@ fn plan(
     })
 }
 
-/// What is foreseen of the steadiest plan that was found, and what the plan bears that is climbed to from there.
+/// Predicted play of the steadiest plan found, and the least load factor after a climb from there.
 fn held(
     ctx: &Ctx<'_>,
     settings: &Settings,
@@ -284,7 +285,7 @@ fn cells(row: &Row) -> Vec<String> {
     cells
 }
 
-/// What can be counted, where there is a division; methods by their place in [`Method::ALL`].
+/// Table of the numbers for all rows with a division; methods by their index in [`Method::ALL`].
 fn table(rows: &[Row]) -> Table {
     let names = [
         "method",

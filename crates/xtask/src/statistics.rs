@@ -1,6 +1,6 @@
-//! Rank correlations, and curves of several runs as one band.
+//! Rank correlations, and bands over the curves of several runs.
 
-/// The rank of each value from 1 on, in increasing order; equal values share the mean of their ranks.
+/// Ranks of the values from 1 on, in increasing order; equal values share the mean of their ranks.
 pub fn mean_ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
@@ -14,8 +14,8 @@ pub fn mean_ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Spearman's ρ in [−1, 1]: the correlation of the mean ranks. `None` where the lengths differ, or one side
-/// is constant, has fewer than two values or one that is not finite.
+/// Spearman's ρ in [−1, 1]: the correlation of the mean ranks. `None` if the lengths differ, or if one side
+/// is constant, has fewer than two values, or has one that is not finite.
 pub fn spearman(a: &[f64], b: &[f64]) -> Option<f64> {
     are_comparable(a, b).then(|| pearson(&mean_ranks(a), &mean_ranks(b)))?
 }
@@ -30,8 +30,8 @@ fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     (aa > 0.0 && bb > 0.0).then(|| (product(a, mean_a, b, mean_b) / (aa * bb).sqrt()).clamp(-1.0, 1.0))
 }
 
-/// Kendall's τ-b in [−1, 1]: concordant less discordant pairs, over the geometric mean of the pairs untied in
-/// `a` and in `b`. `None` as for [`spearman`]. O(n²).
+/// Kendall's τ-b in [−1, 1]: concordant minus discordant pairs, over the geometric mean of the numbers of
+/// pairs untied in `a` and in `b`. `None` as for [`spearman`]. O(n²).
 pub fn kendall(a: &[f64], b: &[f64]) -> Option<f64> {
     if !are_comparable(a, b) {
         return None;
@@ -56,7 +56,7 @@ fn are_comparable(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.len() > 1 && a.iter().chain(b).all(|x| x.is_finite())
 }
 
-/// The values moved and scaled into [0, 1], the least at 0; all 0.5 where they are equal.
+/// Values shifted and scaled to [0, 1], the least at 0; all 0.5 if they are equal.
 pub fn normalised(values: &[f64]) -> Vec<f64> {
     let (low, high) = values
         .iter()
@@ -69,21 +69,21 @@ pub fn normalised(values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What several runs had reached at one moment.
+/// Range of the values that several runs had reached at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandPoint {
-    /// The moment, or whatever the horizontal axis is.
+    /// Time, or whatever the horizontal axis is.
     pub x: f64,
-    /// Least over the runs.
+    /// Least value of the runs.
     pub low: f64,
-    /// Median over the runs.
+    /// Median value of the runs.
     pub middle: f64,
-    /// Greatest over the runs.
+    /// Greatest value of the runs.
     pub high: f64,
 }
 
-/// The range of `runs`, each a step function given by its (x, value) in order of x, from where all have a
-/// value on.
+/// Range of `runs` from the point on where all have a value. Each run is a step function, given by its (x,
+/// value) in order of x.
 pub fn band(runs: &[Vec<(f64, f64)>]) -> Vec<BandPoint> {
     let starts = runs.iter().map(|r| r.first().map_or(f64::INFINITY, |p| p.0));
     let start = starts.fold(f64::NEG_INFINITY, f64::max);

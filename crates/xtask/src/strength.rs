@@ -1,5 +1,4 @@
-//! What the thickness of a wall depends on besides the model: the analysis mesh, the peaks left out, the
-//! falls.
+//! Influences on the thickness of a wall besides the model: the analysis mesh, the peaks left out, the falls.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -14,15 +13,15 @@ use crate::model::{ModelOptions, load, with_ctx};
 use crate::study::write_all;
 use crate::table::markdown;
 
-/// Factors on the points of the analysis mesh.
+/// Factors on the number of points of the analysis mesh.
 const REFINEMENTS: [f64; 3] = [0.5, 1.0, 2.0];
-/// Shares of the area whose stress may be above the one that counts.
+/// Shares of the area that may have more than the stress that counts.
 const PEAK_SHARES: [f64; 5] = [0.0, 0.001, 0.005, 0.01, 0.02];
-/// Numbers of falls.
+/// Compared numbers of falls.
 const FALLS: [usize; 3] = [12, 24, 48];
-/// Seeds of each number of falls.
+/// Number of seeds for each number of falls.
 const N_SEEDS: u64 = 8;
-/// Factor on the points of the mesh while seeds are compared.
+/// Factor on the number of points of the mesh while seeds are compared.
 const COARSE: f64 = 0.25;
 
 /// Which model, and which wall.

@@ -1,4 +1,4 @@
-//! The studies: what each reads, and which charts and tables it writes.
+//! Studies: the options and input of each, and the charts and tables that it writes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -89,7 +89,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// Name and unit of a column, from "name" or "name [unit]".
+/// Splits the header of a column, "name" or "name [unit]", into name and unit.
 fn parts(column: &str) -> (&str, Option<&str>) {
     let split = column.strip_suffix(']').and_then(|c| c.split_once(" ["));
     split.map_or((column, None), |(name, unit)| (name, Some(unit)))
@@ -103,10 +103,10 @@ fn axis(column: &str) -> String {
     )
 }
 
-/// A file to be written: its name in the study's folder, and the text.
+/// A file to be written: its name in the study's folder, and its text.
 pub type Sheet = (String, String);
 
-/// Curves of all metrics over the plans, a scatter of each against the first, and the table of rank
+/// Curves of all metrics over the plans, a scatter plot of each against the first, and a table of the rank
 /// correlations.
 pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
     let columns: Vec<(&str, &[f64])> = scores
@@ -157,7 +157,7 @@ pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
     Ok(sheets)
 }
 
-/// Of each variant, in order, its runs: of each the improvements (seconds, score).
+/// Runs of each variant, in order; each run is a list of its improvements (seconds, score).
 pub type Runs = BTreeMap<usize, Vec<Vec<(f64, f64)>>>;
 
 /// Sorts a table with the columns variant, seed, seconds and score into runs.
@@ -190,7 +190,7 @@ fn runs(table: &Table) -> Result<Runs, String> {
     Ok(runs)
 }
 
-/// Score over time of each variant with its range over the seeds (Fig. 14 and 16).
+/// Chart of each variant's score over time, with its range over the seeds (Fig. 14 and 16).
 pub fn convergence(runs: &Runs, names: &[String], optimum: Option<f64>) -> Result<Sheet, Failure> {
     let name = |i: &usize| names.get(*i).cloned().unwrap_or_else(|| format!("variant {i}"));
     let named: Vec<(String, _)> = runs.iter().map(|(i, runs)| (name(i), band(runs))).collect();
@@ -225,7 +225,7 @@ fn read(path: &Path) -> Result<Table, Failure> {
     })
 }
 
-/// Writes the sheets into a folder of `out`; returns the files.
+/// Writes the sheets into the folder `study` of `out`; returns the files.
 pub fn write_all(out: &Path, study: &str, sheets: &[Sheet]) -> Result<Vec<PathBuf>, Failure> {
     let folder = out.join(study);
     fs::create_dir_all(&folder).map_err(|source| Failure::File {
@@ -248,7 +248,7 @@ fn stem(path: &Path) -> String {
         .map_or_else(|| "study".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// `name` with what does not belong into a file name replaced by `-`.
+/// Replaces every character of `name` that is not alphanumeric by `-`.
 fn file_name(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_alphanumeric() { c } else { '-' })

@@ -1,15 +1,15 @@
-//! Named columns of numbers: CSV in and out, Markdown out.
+//! Named columns of numbers: reads and writes CSV, writes Markdown.
 
 /// Columns of equal length, by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// In order; each with its values, not a number where there is none.
+    /// Columns in order, each with its name and its values; NaN for missing values.
     pub columns: Vec<(String, Vec<f64>)>,
 }
 
 impl Table {
-    /// Reads comma-separated numbers under one line of names; blank lines are passed over, an empty field is
-    /// a value that is missing.
+    /// Parses comma-separated numbers under one line of names. Blank lines are skipped; an empty field is a
+    /// missing value.
     pub fn from_csv(text: &str) -> Result<Self, String> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
         let (_, names) = lines
@@ -44,12 +44,13 @@ impl Table {
         Ok(Self { columns })
     }
 
-    /// The values under `name`.
+    /// Values of the column `name`; `None` if there is no such column.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|c| c.0 == name).map(|c| c.1.as_slice())
     }
 
-    /// What [`Self::from_csv`] reads; shortest decimal forms that give the same numbers.
+    /// Writes the format that [`Self::from_csv`] reads, with the shortest decimals that give the same
+    /// numbers.
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.columns.iter().map(|c| c.0.as_str()).collect();
         let rows = self.rows().map(|row| {
@@ -63,7 +64,7 @@ impl Table {
             .collect()
     }
 
-    /// The rows in which nothing is missing.
+    /// Table of the rows without missing values.
     pub fn complete(&self) -> Self {
         let is_whole: Vec<bool> = self.rows().map(|mut row| row.all(f64::is_finite)).collect();
         let kept = |values: &[f64]| {
@@ -89,7 +90,7 @@ impl Table {
     }
 }
 
-/// A Markdown table.
+/// Writes a Markdown table with these column heads.
 pub fn markdown(head: &[&str], rows: &[Vec<String>]) -> String {
     let line = |cells: Vec<&str>| format!("| {} |\n", cells.join(" | "));
     let rule = line(vec!["---"; head.len()]);

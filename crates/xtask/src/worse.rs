@@ -1,5 +1,5 @@
-//! Whether designs that ought to be worse are (Fig. 15): half connectors, and plans of half the score, under a punch
-//! and in a fall, by walls and connectors without gaps.
+//! Checks that designs which should be worse are worse (Fig. 15): half connectors, and plans of half the
+//! score, under a punch and in a fall, modelled as walls and connectors without gaps.
 
 use std::path::{Path, PathBuf};
 
@@ -88,7 +88,7 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
     write_all(out, &format!("{}/worse", options.model.name()), &[sheet])
 }
 
-/// The kit and half connectors are the same of all draws.
+/// Rows of one draw. The kit and half connectors are the same in all draws and listed for the first only.
 fn said(draw: u64, compared: &Comparison) -> Vec<Vec<String>> {
     let designs = compared.designs().into_iter();
     let told = designs.filter(|(name, _)| draw == 0 || *name == "half score");

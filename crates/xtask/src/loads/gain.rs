@@ -1,5 +1,5 @@
-//! What a climb gains over the search's plan and over plans drawn at random: load factors, and how far the even
-//! force opens the seams.
+//! Gain of a climb over the search's plan and over random plans: load factors, and openings of the seams
+//! under the even force.
 
 use std::time::Instant;
 
@@ -20,10 +20,10 @@ use crate::metrics::{Subject, failed};
 use crate::study::Sheet;
 use crate::table::markdown;
 
-/// Plans that are rated side by side before the best of them decides which others are given up.
+/// Number of plans rated in parallel before the best of them sets the floor for rejecting others.
 const BATCH: usize = 256;
 
-/// The plan that a climb ends at beside the search's plan, load by load, and beside plans drawn at random.
+/// Compares the plan that a climb ends at with the search's plan, load by load, and with random plans.
 pub fn sheets(
     subject: &Subject,
     options: &LoadsOptions,
@@ -61,7 +61,7 @@ pub fn sheets(
     ])
 }
 
-/// Random plans with that key.
+/// Draws random plans with that key.
 fn of_one_key(
     subject: &Subject,
     options: &LoadsOptions,
@@ -93,7 +93,7 @@ fn found(
     }
 }
 
-/// How fast a climb was, in words.
+/// Describes the speed of a climb in words.
 fn pace(top: &Climbed<'_>, seconds: f64) -> String {
     format!(
         "climb: {} plans and {} loads solved in {seconds:.2} s, {:.0} plans and {:.0} loads a second",
@@ -119,20 +119,20 @@ fn load_by_load(bench: &Bench<'_>, first: &Rated<'_>, best: &Rated<'_>) -> Strin
 struct Scale<'a> {
     subject: &'a Subject,
     surface: SurfaceModel,
-    /// What people do to a kit.
+    /// Loads that people apply to a kit in use.
     uses: Vec<Drift>,
     strength_mpa: f64,
 }
 
-/// Plans drawn at random.
+/// Results for random plans.
 struct Drawn {
-    /// Weighted openings under the even force, −Q, mm, the least first.
+    /// Weighted openings under the even force, −Q, mm, in increasing order.
     openings_mm: Vec<f64>,
-    /// Of those that the climb may take.
+    /// Openings of the plans that the climb may choose, mm, in increasing order.
     allowed_mm: Vec<f64>,
-    /// The largest least load factor of uses.
+    /// Largest of the plans' least load factors of uses.
     most_borne: f64,
-    /// Openings that were computed a second.
+    /// Number of openings computed per second.
     openings_a_second: f64,
 }
 
@@ -149,14 +149,14 @@ impl<'a> Scale<'a> {
         })
     }
 
-    /// How far the even force opens the weakest seam of a plan, −Q, mm.
+    /// Opening of a plan's weakest seam under the even force, −Q, mm.
     fn opening_mm(&self, plan: &LatticePlan) -> Result<f64, SparseError> {
         let meetings = self.subject.model.meetings(plan);
         let (opening, _) = self.surface.joined(&meetings)?.pulled(&meetings, None)?;
         Ok(-opening.quality_mm)
     }
 
-    /// The least load factor of uses; `None` where one is less than `floor`.
+    /// Least load factor of uses; `None` if it is below `floor`.
     fn least(&self, plan: &LatticePlan, floor: f64) -> Result<Option<f64>, SparseError> {
         let meetings = self.subject.model.meetings(plan);
         let joined = self.surface.joined(&meetings)?;
@@ -199,7 +199,7 @@ impl<'a> Scale<'a> {
     }
 }
 
-/// The even force's openings and the least use of plans drawn at random, of the search's and of the climbed one.
+/// Table of the openings and least uses of random plans, of the search's plan and of the climbed plan.
 fn openings(
     scale: &Scale<'_>,
     drawn: &Drawn,
@@ -229,7 +229,7 @@ fn openings(
     ))
 }
 
-/// Plans with their openings, mm, and the least of their uses' load factors.
+/// Table of plans with their openings, mm, relative to the median, and their least load factors of uses.
 fn beside_median(plans: &[(&str, (f64, f64))], median_mm: f64) -> String {
     let row = |(name, (mm, least)): &(&str, (f64, f64))| {
         let figures = [number(*mm, 4), number(mm / median_mm, 3), number(*least, 3)];
@@ -244,7 +244,7 @@ fn beside_median(plans: &[(&str, (f64, f64))], median_mm: f64) -> String {
     markdown(&head, &plans.iter().map(row).collect::<Vec<_>>())
 }
 
-/// With so many digits; a dash where there is none.
+/// Writes a number with so many digits; a dash for NaN.
 fn number(x: f64, digits: usize) -> String {
     if x.is_nan() {
         "–".to_owned()
@@ -253,7 +253,7 @@ fn number(x: f64, digits: usize) -> String {
     }
 }
 
-/// Of values in increasing order; not a number where there are none.
+/// Quantile of values in increasing order; NaN if there are none.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = (share * (sorted.len().max(1) - 1) as f64) as usize;
     sorted.get(at).copied().unwrap_or(f64::NAN)

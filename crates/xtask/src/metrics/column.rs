@@ -1,4 +1,4 @@
-//! One metric over all plans, and how long it takes.
+//! Scores of one metric for all plans, and its run time.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -16,18 +16,18 @@ use shellock_mechanics::{
 use super::Subject;
 use crate::failure::Failure;
 
-/// Plans that are timed one by one, before all are evaluated on all cores.
+/// Number of plans that are timed one by one before all are evaluated on all cores.
 const N_TIMED: usize = 5;
 
-/// What a metric says of a plan.
+/// Score of a plan by one metric.
 #[derive(Clone, Debug)]
 pub enum Score {
-    /// Simulated as a whole.
+    /// The plan was simulated as a whole and holds.
     Holds(Opening),
-    /// A number alone; higher is better.
+    /// The metric gives only a number; higher is better.
     Rated(f64),
     Separable,
-    /// The solver failed.
+    /// The solver failed for this plan.
     Unsolved,
 }
 
@@ -49,13 +49,13 @@ impl Score {
         }
     }
 
-    /// Says why a plan has no score.
+    /// Warns why a plan has no score, and returns that score.
     fn unsolved(why: &str) -> Self {
         eprintln!("warning: a plan was not solved: {why}");
         Self::Unsolved
     }
 
-    /// What opens, where the plan was simulated as a whole and holds.
+    /// Opening of the seams if the plan was simulated as a whole and holds; else `None`.
     pub fn opening(&self) -> Option<&Opening> {
         if let Self::Holds(opening) = self {
             Some(opening)
@@ -64,7 +64,7 @@ impl Score {
         }
     }
 
-    /// Not a number where there is none; higher is better.
+    /// Quality of the plan, higher is better; NaN if it has none.
     fn quality(&self) -> f64 {
         match self {
             Self::Holds(opening) => opening.quality_mm,
@@ -74,27 +74,27 @@ impl Score {
     }
 }
 
-/// One metric over all plans.
+/// Scores of one metric for all plans.
 pub struct Column {
-    /// With the unit in brackets, if it has one.
+    /// Name of the metric, with the unit in brackets if it has one.
     pub name: String,
-    /// Of each plan.
+    /// Scores in order of the plans.
     pub scores: Vec<Score>,
     pub times: Times,
 }
 
-/// Wall time, s.
+/// Wall-clock times of a metric, s.
 pub struct Times {
-    /// Making what all plans share.
+    /// Time to prepare what all plans share.
     pub setup: f64,
-    /// A plan, alone on the machine: median of the first ones.
+    /// Time for a plan, one at a time: median of the first ones.
     pub alone: f64,
-    /// A plan, where all are evaluated side by side.
+    /// Time for a plan when all are evaluated in parallel.
     pub together: f64,
 }
 
 impl Column {
-    /// `scores` of plans 0 to `n` − 1 by what `prepare` makes.
+    /// Computes the `score` of plans 0 to `n` − 1 with the result of `prepare`, and measures the times.
     fn new<T: Sync>(
         name: &str,
         n: usize,
@@ -136,7 +136,7 @@ impl Column {
         })
     }
 
-    /// The volume metric on the first `n` plans.
+    /// Evaluates the volume metric on the first `n` plans.
     pub fn by_volume(
         name: &str,
         subject: &Subject,
@@ -152,7 +152,7 @@ impl Column {
         })
     }
 
-    /// The surface metric with these factors on stretch, bending and position.
+    /// Evaluates the surface metric with these factors on stretch, bending and position.
     pub fn by_surface(name: &str, subject: &Subject, stiffness_ratios: [f64; 3]) -> Result<Self, Failure> {
         let params = SurfaceParams {
             stiffness_ratios,
@@ -164,7 +164,7 @@ impl Column {
         })
     }
 
-    /// Each piece alone, its neighbours held.
+    /// Evaluates each piece alone, with its neighbours held.
     pub fn by_pieces_alone(name: &str, subject: &Subject) -> Result<Self, Failure> {
         let surface = || subject.model.surface_model().map_err(|e| failed(name, &e));
         Self::new(
@@ -183,7 +183,7 @@ impl Column {
         )
     }
 
-    /// Eq. 6 as published.
+    /// Evaluates Eq. 6 as published.
     pub fn by_eq_6(name: &str, subject: &Subject) -> Result<Self, Failure> {
         let tests = || LocalTests::simulate(&subject.model.params.surface()).map_err(|e| failed(name, &e));
         Self::new(name, subject.plans.len(), tests, |tests, i| {
@@ -191,7 +191,7 @@ impl Column {
         })
     }
 
-    /// What the search minimises, with its sign turned: `of` takes it from the costs of a plan.
+    /// Evaluates the negated cost that the search minimises; `of` selects it from the costs of a plan.
     pub fn by_cost(name: &str, subject: &Subject, of: fn(&PlanScore) -> f64) -> Result<Self, Failure> {
         let nothing_shared = || Ok(PlanConstraints::default());
         Self::new(name, subject.plans.len(), nothing_shared, |constraints, i| {
@@ -199,12 +199,12 @@ impl Column {
         })
     }
 
-    /// Whether it can tell that a plan comes apart.
+    /// Returns true if the metric can find that a plan comes apart.
     pub fn knows_separable(&self) -> bool {
         self.scores.iter().any(|s| !matches!(s, Score::Rated(_)))
     }
 
-    /// The qualities, higher is better; not a number where there is none.
+    /// Qualities of the plans, higher is better; NaN where there is none.
     pub fn qualities(&self) -> Vec<f64> {
         self.scores.iter().map(Score::quality).collect()
     }
@@ -220,7 +220,7 @@ fn volume_model(subject: &Subject, youngs_modulus_mpa: f64) -> Result<VolumeMode
     VolumeModel::new(&params, &subject.model.assembly)
 }
 
-/// A metric that could not be computed.
+/// Creates the failure of a metric that could not be computed.
 pub fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
     Failure::Metric {
         metric: metric.to_owned(),

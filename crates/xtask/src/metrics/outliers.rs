@@ -1,4 +1,4 @@
-//! Where two metrics disagree: the plans whose ranks differ most, and the openings at their stations.
+//! Disagreement of two metrics: the plans whose ranks differ most, and the openings at their stations.
 
 use shellock_mechanics::{Opening, Side};
 
@@ -7,27 +7,27 @@ use super::column::Column;
 use crate::statistics::mean_ranks;
 use crate::table::Table;
 
-/// A plan that both metrics say holds.
+/// A plan that holds by both metrics.
 pub struct Outlier {
-    /// Its number.
+    /// Number of the plan.
     pub plan: usize,
-    /// Among the plans that hold, by each metric; 1 is the worst.
+    /// Rank among the plans that hold, by each metric; 1 is the worst.
     pub ranks: [f64; 2],
-    /// The station that decides by each metric.
+    /// Weakest station of the plan by each metric.
     pub deciding: Vec<Deciding>,
 }
 
-/// A station that decides.
+/// A station that determines a plan's quality.
 pub struct Deciding {
-    /// Its number.
+    /// Number of the station.
     pub station: u32,
-    /// The pieces that meet there.
+    /// Pieces that meet at the station.
     pub pieces: [u32; 2],
     /// Weighted opening by each metric, mm.
     pub weighted_mm: [f64; 2],
 }
 
-/// The plans that hold by both metrics, those whose ranks differ most first.
+/// Plans that hold by both metrics, sorted by the difference of their ranks, largest first.
 pub fn outliers(subject: &Subject, first: &Column, second: &Column) -> Vec<Outlier> {
     let both: Vec<(usize, [&Opening; 2])> = (first.scores.iter().zip(&second.scores).enumerate())
         .filter_map(|(i, (a, b))| Some((i, [a.opening()?, b.opening()?])))

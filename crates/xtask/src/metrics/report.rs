@@ -1,4 +1,4 @@
-//! The study's figures for people.
+//! Report of the metrics study, in Markdown for people.
 
 use super::Subject;
 use super::column::{Column, Score};
@@ -6,10 +6,10 @@ use super::outliers::{Outlier, outliers};
 use crate::statistics::{kendall, spearman};
 use crate::table::markdown;
 
-/// Outliers that are told.
+/// Number of outliers that the report lists.
 const N_OUTLIERS: usize = 5;
 
-/// Correlations, who is separable, times and the worst outliers.
+/// Writes correlations, verdicts on separability, times and the worst outliers.
 pub fn markdown_of(
     name: &str,
     subject: &Subject,
@@ -80,7 +80,7 @@ fn correlations<'a>(reference: &Column, others: impl IntoIterator<Item = &'a Col
     )
 }
 
-/// How often each pair of verdicts was given: rows by the reference, columns by the other.
+/// Counts each pair of verdicts: rows by the reference, columns by the other.
 fn verdicts(reference: &Column, other: &Column) -> Vec<Vec<String>> {
     let verdict = |s: &Score| match s {
         Score::Holds(_) | Score::Rated(_) => 0,

@@ -1,4 +1,4 @@
-//! The kit as a whole: together, apart, in steps, its patches, and where its pieces hold each other.
+//! Pictures of the whole kit: assembled, apart, in steps, its patches, and the contacts that hold its pieces.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ use super::draw::{DARK, PALE, dots, part, plain, tube};
 use super::kit::Kit;
 use super::sheet::{Sheet, WIDTH, hex, pasted, pixels, small_png};
 
-/// How far a new piece is from its place, mm.
+/// Distance of a new piece from its place, mm.
 const TRAVEL_MM: f64 = 30.0;
 
-/// Direction of sight for what is underneath.
+/// View direction for pieces underneath.
 const FROM_BELOW: Vec3 = Vec3::new(-0.62, 0.95, 0.8);
 
-/// All pieces from the front, apart by a share of their exploded view.
+/// Renders all pieces from the front, moved apart by a share of their exploded view.
 fn all(kit: &Kit, share: f64, camera: &Camera, [width, height]: [usize; 2]) -> Image {
     let shifts = exploded_shifts(&kit.report_pieces());
     let scene: Vec<Painted<'_>> = kit
@@ -27,12 +27,12 @@ fn all(kit: &Kit, share: f64, camera: &Camera, [width, height]: [usize; 2]) -> I
     render(&scene, camera, width, height)
 }
 
-/// How it goes together, some steps of all, and the whole beside them.
+/// Shows the whole kit, with some of its assembly steps beside it.
 pub fn kit(kit: &Kit) -> Vec<u8> {
     const WHOLE: [usize; 2] = [420, 740];
     const STEP: [usize; 2] = [255, 365];
     const COLUMNS: usize = 3;
-    /// The first, the last and what is evenly between.
+    /// Number of steps shown: the first, the last, and evenly spaced ones between.
     const SHOWN: usize = 6;
     let order = kit.in_order();
     let last = order.len() - 1;
@@ -47,7 +47,7 @@ pub fn kit(kit: &Kit) -> Vec<u8> {
     small_png(&pasted([WHOLE[0] + COLUMNS * 260, WHOLE[1]], &pictures), 200)
 }
 
-/// Points without triangles, which all steps' pictures are so wide and high for.
+/// Points without triangles that give all step pictures the same frame.
 fn room_of_steps(kit: &Kit) -> TriMesh {
     let places = |p: PatchId| {
         let travel = TRAVEL_MM * kit.way_out(p);
@@ -60,7 +60,8 @@ fn room_of_steps(kit: &Kit) -> TriMesh {
     }
 }
 
-/// The pieces that are there after a step, the new one on its way; the key, which is underneath, from below.
+/// Renders the pieces present after a step, with the new one on its way. The key, which is underneath, is
+/// seen from below.
 fn step_picture(kit: &Kit, order: &[PatchId], step: usize, room: &TriMesh, size: [usize; 2]) -> Image {
     let mut scene: Vec<Painted<'_>> = order[..=step]
         .iter()
@@ -86,7 +87,7 @@ fn step_picture(kit: &Kit, order: &[PatchId], step: usize, room: &TriMesh, size:
     render(&scene, &camera, size[0], size[1])
 }
 
-/// Every step, in order, from one place.
+/// Shows every step, in order, from one viewpoint.
 pub fn steps(kit: &Kit) -> Vec<u8> {
     const COLUMNS: usize = 5;
     const CELL: [f64; 2] = [WIDTH / COLUMNS as f64, 190.0];
@@ -106,7 +107,7 @@ pub fn steps(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// The outer surface from the front and from behind, a colour a patch, and all seams through it.
+/// Shows the outer surface from the front and from behind, a colour a patch, and all its seams.
 pub fn segmentation(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 3.0, 330.0];
     let surface = &kit.design.kit.surface;
@@ -147,10 +148,10 @@ pub fn segmentation(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// Contacts nearer to each other than this, mm, are one dot.
+/// Distance, mm, below which contacts are drawn as one dot.
 const APART_MM: f64 = 2.6;
 
-/// A piece from inside with the contacts that hold it, in the colours of those that it touches.
+/// Shows a piece from inside, with the contacts that hold it in the colours of the pieces that it touches.
 pub fn contacts(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 360.0];
     let made = &kit.design.kit;
@@ -160,7 +161,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
         .fold(Aabb::EMPTY, |b, m| b.union(m.bounds()))
         .center();
     let outwards = |p: PatchId| (kit.meshes[usize::from(p)].bounds().center() - middle).normalize();
-    // The two pieces of whose contacts most are seen from inside, but for the key, which may leave.
+    // The two pieces with most contacts visible from inside are shown, but not the key, which may leave.
     let seen = |p: PatchId| {
         let faces_viewer = |n: Vec3| n.dot(-outwards(p)) > 0.5;
         made.touching
@@ -213,14 +214,14 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// For the first page of the library's documentation: together, apart, and what it is.
+/// Shows the kit assembled and apart, with a description, for the first page of the library's documentation.
 pub fn first_page(kit: &Kit) -> Vec<u8> {
     const HEIGHT: f64 = 300.0;
     let mut sheet = Sheet::new(HEIGHT + 10.0);
     for (i, share) in [0.0, 1.0].into_iter().enumerate() {
         let size = [pixels(250.0) * 2 / 3, pixels(HEIGHT) * 2 / 3];
         let still = all(kit, share, &Camera::front(), size);
-        // Coarse and in few colours: it is part of the page's text.
+        // The image is small and has few colours, because it is part of the page's text.
         let data = shrunk(still);
         sheet.0.push_str(&format!(
             "<image x=\"{}\" y=\"5\" width=\"250\" height=\"{HEIGHT}\" href=\"data:image/png;base64,{data}\"/>\n",

@@ -1,4 +1,4 @@
-//! Close-ups: seams of finished pieces, cut across, and the key with its prism and rails.
+//! Close-ups: sections across seams of finished pieces, and the key with its prism and rails.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ use super::kit::Kit;
 use super::sheet::{Sheet, WIDTH, pixels};
 use crate::failure::Failure;
 
-/// Half of what is seen of a seam, mm.
+/// Half of the visible extent of a seam's section, mm.
 const HALF_MM: f64 = 7.0;
-/// A joint that is shown keeps so much of both halves, and is so long, mm.
+/// Least share of both halves that a shown joint keeps, and its least length, mm.
 const LEAST_KEPT: f64 = 0.6;
 const LEAST_MM: f64 = 6.0;
 
-/// A joint where it is cut across.
+/// A joint at the place of its section.
 struct Place {
     male: PatchId,
     female: PatchId,
@@ -39,7 +39,7 @@ fn fault(problem: &str) -> Failure {
     }
 }
 
-/// The joints of the kit, by the angle T in the middle of each.
+/// Places of the kit's joints, each with the angle T in its middle.
 fn places(kit: &Kit) -> Vec<Place> {
     let made = &kit.design.kit;
     let bvh = TriangleBvh::new(&made.surface.mesh);
@@ -71,7 +71,7 @@ fn places(kit: &Kit) -> Vec<Place> {
                 -made.plan.separation(joint.female).unit()
             };
             let theta_deg = s.dot(to_female).atan2(s.dot(normal)).to_degrees();
-            // Seams that are left along themselves look like nothing in a section.
+            // Seams that are left along themselves show nothing in a section.
             (joint.is_rail || s.dot(tangent).abs() < 0.5).then_some(Place {
                 male: joint.male,
                 female: joint.female,
@@ -87,10 +87,10 @@ fn places(kit: &Kit) -> Vec<Place> {
         .collect()
 }
 
-/// Three seams of finished pieces, cut across: forward, straight out, and a rail of the key.
+/// Shows sections across three seams of finished pieces: forward, straight out, and a rail of the key.
 pub fn seams(kit: &Kit) -> Result<Vec<u8>, Failure> {
     const VIEW: [f64; 2] = [WIDTH / 3.0, 210.0];
-    /// How far the angle of a seam may be from the one that is asked for, degrees.
+    /// Largest difference of a seam's angle from the wanted one, degrees.
     const ABOUT_DEG: f64 = 14.0;
     let places = places(kit);
     let longest = |is_such: &dyn Fn(&Place) -> bool| {
@@ -131,7 +131,7 @@ pub fn seams(kit: &Kit) -> Result<Vec<u8>, Failure> {
     Ok(sheet.bytes())
 }
 
-/// What a box about the place holds of the finished pieces, seen along the seam.
+/// Renders the finished pieces inside a box about the place, seen along the seam.
 fn cut_across(kit: &Kit, place: &Place, size: [usize; 2]) -> Result<shellock_render::stills::Image, Failure> {
     let Place {
         at,
@@ -176,7 +176,7 @@ fn cut_across(kit: &Kit, place: &Place, size: [usize; 2]) -> Result<shellock_ren
     Ok(render(&scene, &camera, size[0], size[1]))
 }
 
-/// The key on its way with its prism, where it was, and itself from inside.
+/// Shows the key on its way out with its prism, the place that it leaves, and the key from inside.
 pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
     const VIEW: [f64; 2] = [WIDTH / 3.0, 280.0];
     let site = kit.design.key.as_ref().ok_or_else(|| fault("no key was cut"))?;
@@ -241,7 +241,7 @@ pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
     Ok(sheet.bytes())
 }
 
-/// The edges of the key's prism as it stands, somewhat above the plane, so that they are seen.
+/// Edges of the key's prism in place, slightly above the plane so that they are visible.
 fn edges(kit: &Kit) -> Vec<TriMesh> {
     let Some(prism) = kit.design.key.as_ref().map(|site| site.prism) else {
         return Vec::new();

@@ -1,16 +1,15 @@
-//! The connector's section over the angle T, and that of a rail: drawn from the parts that pieces are made
-//! of.
+//! Section of the connector over the angle T, and of a rail, drawn from the parts that pieces are made of.
 
 use shellock::connector::{ConnectorParams, Part, RailPart, RunShape, RunStation, Section};
 use shellock_geom::Vec3;
 
 use super::sheet::{Sheet, WIDTH};
 
-/// Connector size, wall and their scale on the sheet.
+/// Connector size and wall, mm, and their scale on the sheet.
 const SIZE_MM: f64 = 2.5;
 const WALL_MM: f64 = 2.0;
 const PX_PER_MM: f64 = 22.0;
-/// Half of the wall that is drawn, mm.
+/// Half of the drawn width of the wall, mm.
 const HALF_MM: f64 = 5.2;
 /// Angles T that are shown, degrees: from a tongue to the most backward one that is made.
 const ANGLES: [f64; 5] = [-90.0, -45.0, 0.0, 30.0, 60.0];
@@ -19,7 +18,7 @@ const MALE: &str = "#e8a05c";
 const FEMALE: &str = "#7fa6d8";
 const THIN: &str = "stroke=\"#333\" stroke-width=\"0.8\"";
 
-/// Sections at five angles and that of a rail, three in a row.
+/// Draws sections at five angles and of a rail, three in a row.
 pub fn profiles() -> String {
     const CELL: [f64; 2] = [WIDTH / 3.0, 212.0];
     let mut sheet = Sheet::new(2.0 * CELL[1] + 34.0);
@@ -63,7 +62,7 @@ fn legend(sheet: &mut Sheet, [x, y]: [f64; 2], fill: &str, words: &str) {
     sheet.words([x, y], words);
 }
 
-/// A section with its seam on the wall's inner side at `at`.
+/// Draws a section; `at` is the seam on the wall's inner side.
 fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
     let params = ConnectorParams::default();
     let station = station(degrees, shape, &params);
@@ -91,11 +90,11 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
         ]
         .map(on_sheet)
     };
-    // In a rail n leads from the neighbour, which has the tongue, to the key.
+    // In a rail, n leads from the neighbour, which has the tongue, to the key.
     draw(sheet, &parts.male, MALE);
     draw(sheet, &parts.female, FEMALE);
-    // Parts reach into the wall that they hang from; what is in the seam or in the other's wall is carved
-    // off.
+    // Parts reach into the wall that they hang from. Whatever lies in the seam or in the other's wall is
+    // carved off.
     let slit = [
         [-gap, 0.0],
         [gap, 0.0],
@@ -112,9 +111,9 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
     }
 }
 
-/// ŝ, from the male's side of the cavity.
+/// Draws ŝ as an arrow, on the male's side of the cavity.
 fn arrow(sheet: &mut Sheet, station: &RunStation, on_sheet: &impl Fn([f64; 2]) -> [f64; 2]) {
-    // Beside the channel: it leans to the other side where ŝ is backward.
+    // The arrow is beside the channel, which leans to the other side if ŝ is backward.
     let foot = if station.theta > 0.1 {
         [3.2, -3.2]
     } else {

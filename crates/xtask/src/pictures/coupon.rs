@@ -1,4 +1,4 @@
-//! The fit test: its plate, and how the parts of a number go together.
+//! Pictures of the fit test: its plate, and the assembly of one number's parts.
 
 use shellock::coupon::{Kind, Part, coupon, fits};
 use shellock_geom::{TriMesh, Vec3};
@@ -10,10 +10,10 @@ use super::draw::plain;
 use super::sheet::{Sheet, WIDTH, pixels};
 use crate::failure::Failure;
 
-/// How far parts are apart in the picture of how they go together, mm.
+/// Distance of the parts in the picture of their assembly, mm.
 const PULLED_MM: f64 = 5.0;
 
-/// The plate for a resin printer, and the joints of number 3 on their way.
+/// Shows the plate for a resin printer, and the joints of number 3 half assembled.
 pub fn plate() -> Result<Vec<u8>, Failure> {
     const PLATE: [f64; 2] = [WIDTH, 330.0];
     const JOINT: [f64; 2] = [WIDTH / 2.0, 260.0];

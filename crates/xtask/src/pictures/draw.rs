@@ -1,4 +1,4 @@
-//! Small meshes to point at things with, and colours of quantities.
+//! Small meshes as markers, and colours for quantities.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -8,13 +8,13 @@ use shellock_render::stills::Painted;
 
 use super::sheet::{Sheet, hex};
 
-/// What stands back behind what is shown.
+/// Colour of the background behind the subject.
 pub const PALE: [u8; 3] = [218, 215, 208];
 pub const DARK: [u8; 3] = [40, 40, 46];
 pub const RED: [u8; 3] = [206, 44, 30];
 
-/// Colours of a quantity from nothing to its most, evenly apart; they grow lighter, so that they are told
-/// apart in grey.
+/// Evenly spaced colours of a quantity from 0 to its largest value. They grow lighter, so that they differ in
+/// grey, too.
 const SCALE: [[u8; 3]; 5] = [
     [68, 1, 84],
     [59, 82, 139],
@@ -23,7 +23,7 @@ const SCALE: [[u8; 3]; 5] = [
     [253, 231, 37],
 ];
 
-/// The colour of a share from 0 to 1.
+/// Colour of a share from 0 to 1.
 pub fn color_of(share: f64) -> [u8; 3] {
     let at = share.clamp(0.0, 1.0) * (SCALE.len() - 1) as f64;
     let i = (at as usize).min(SCALE.len() - 2);
@@ -31,7 +31,7 @@ pub fn color_of(share: f64) -> [u8; 3] {
     [0, 1, 2].map(|k| (f64::from(low[k]) * (1.0 - t) + f64::from(high[k]) * t).round() as u8)
 }
 
-/// The scale from 0 to `most` below a picture.
+/// Draws the scale from 0 to `most` below a picture.
 pub fn color_bar(sheet: &mut Sheet, [x, y]: [f64; 2], width: f64, most: &str, what: &str) {
     const STEPS: usize = 50;
     for i in 0..STEPS {
@@ -49,7 +49,7 @@ pub fn color_bar(sheet: &mut Sheet, [x, y]: [f64; 2], width: f64, most: &str, wh
     sheet.amid([x + 0.5 * width, y + 29.0], what);
 }
 
-/// A mesh of one colour in its place.
+/// Mesh of one colour in its place.
 pub fn plain(mesh: &TriMesh, color: [u8; 3]) -> Painted<'_> {
     Painted {
         mesh,
@@ -60,7 +60,7 @@ pub fn plain(mesh: &TriMesh, color: [u8; 3]) -> Painted<'_> {
     }
 }
 
-/// Tubes around the stretches of a line.
+/// Tubes around the segments of a line.
 pub fn tube(points: &[Vec3], radius_mm: f64) -> TriMesh {
     const SIDES: u32 = 8;
     let mut mesh = TriMesh::default();
@@ -109,7 +109,7 @@ pub fn dots(places: impl IntoIterator<Item = Vec3>, radius_mm: f64) -> TriMesh {
     mesh
 }
 
-/// The faces that `keep` names.
+/// Mesh of the faces that `keep` selects.
 pub fn part(mesh: &TriMesh, keep: impl Fn(usize) -> bool) -> TriMesh {
     let kept = (0..mesh.triangles.len()).filter(|&f| keep(f));
     TriMesh {

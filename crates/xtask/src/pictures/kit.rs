@@ -1,4 +1,4 @@
-//! The kit that is shown.
+//! Kit that the pictures show.
 
 use std::path::PathBuf;
 
@@ -17,19 +17,19 @@ use shellock_render::{ReportPiece, palette};
 use crate::failure::Failure;
 use crate::model::with_ctx;
 
-/// Size of the figure, and of its triangles as a share of that: those of `shellock demo`.
+/// Size of the figure, mm, and number of triangles along it, as in `shellock demo`.
 const SIZE_MM: f64 = 150.0;
 const CELLS: f64 = 94.0;
 
-/// Pieces that `shellock demo` asks for.
+/// Number of pieces in `shellock demo`.
 const OF_DEMO: usize = 7;
 
-/// The options of `shellock demo`, but for how it divides.
+/// Parameters of `shellock demo`, except for the division.
 fn params() -> Params {
     let printer = Printer::sla();
     let mut params = Params::default();
     params.thickness = Thickness::Auto;
-    // Ten seconds' worth, as the command line counts them.
+    // The work of ten seconds, as the command line counts it.
     params.proof_budget = 200_000;
     params.material = printer.material;
     params.seam_gap_mm = printer.tolerance_mm;
@@ -43,20 +43,20 @@ fn params() -> Params {
     params
 }
 
-/// A finished kit with its pieces as they stand.
+/// A finished kit with its pieces in place.
 pub struct Kit {
     pub design: Design,
-    /// What it was made with, the thickness of its wall included.
+    /// Settings of the kit, including the thickness of its wall.
     pub settings: Settings,
-    /// The model as it was given.
+    /// Model as it was given.
     pub model: Solid,
-    /// One a piece, z up.
+    /// Meshes of the pieces in place, z up.
     pub meshes: Vec<TriMesh>,
     normals: Vec<Vec<[Vec3; 3]>>,
 }
 
 impl Kit {
-    /// The squirrel of `shellock demo`: cut where a person would, of few pieces.
+    /// Makes the squirrel of `shellock demo`: cut where a person would cut, into few pieces.
     pub fn of_demo() -> Result<Self, Failure> {
         let mut params = params();
         params.method = Method::Auto;
@@ -64,7 +64,7 @@ impl Kit {
         Self::made(&params)
     }
 
-    /// A squirrel of pieces of similar size, with joints of all kinds, for close views.
+    /// Makes a squirrel with pieces of similar size and joints of all kinds, for close-ups.
     pub fn squirrel() -> Result<Self, Failure> {
         Self::made(&params())
     }
@@ -106,12 +106,12 @@ impl Kit {
         palette::color(self.design.kit.plan.position(piece))
     }
 
-    /// The way out of a piece as it stands, a unit vector.
+    /// Direction in which a piece leaves, a unit vector.
     pub fn way_out(&self, piece: PatchId) -> Vec3 {
         self.design.kit.plan.separation(piece).unit()
     }
 
-    /// A piece as it stands, moved by `shift`.
+    /// Piece in place, moved by `shift`.
     pub fn painted(&self, piece: PatchId, shift: Vec3) -> Painted<'_> {
         let i = usize::from(piece);
         Painted {
@@ -123,7 +123,7 @@ impl Kit {
         }
     }
 
-    /// As the page and the booklet take them.
+    /// Pieces in the form that the page and the booklet need.
     pub fn report_pieces(&self) -> Vec<ReportPiece<'_>> {
         let plan = &self.design.kit.plan;
         self.ids()

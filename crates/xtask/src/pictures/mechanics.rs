@@ -1,4 +1,4 @@
-//! What forces do: to the wall, along the seams, to the finished kit.
+//! Effects of forces: on the wall, along the seams, on the finished kit.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ use super::sheet::{Sheet, WIDTH, pixels, with_small_stills};
 use crate::failure::Failure;
 use crate::model::with_ctx;
 
-/// A seam of which nothing is known.
+/// Colour of a seam without a value.
 const NONE: [u8; 3] = [120; 3];
 
 fn strength_of(kit: &Kit) -> Result<&Strength, Failure> {
@@ -28,7 +28,7 @@ fn strength_of(kit: &Kit) -> Result<&Strength, Failure> {
     })
 }
 
-/// The stress of the fall that decides, from the side of the worst place and from the other.
+/// Shows the stress in the deciding fall, from the front and from behind.
 pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 380.0];
     let strength = strength_of(kit)?;
@@ -69,7 +69,7 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     Ok(sheet.bytes())
 }
 
-/// The chart that every kit has as `strength.svg`.
+/// Draws the chart that every kit has as `strength.svg`.
 pub fn strength(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let strength = strength_of(kit)?;
     let map = StressMap::new(strength);
@@ -90,7 +90,7 @@ pub fn strength(kit: &Kit) -> Result<Vec<u8>, Failure> {
     Ok(with_small_stills(&chart).into_bytes())
 }
 
-/// How far each seam opens in the surface metric, with the weakest places.
+/// Shows the opening of each seam by the surface metric, and the weakest place.
 pub fn openings(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 380.0];
     let made = &kit.design.kit;
@@ -130,7 +130,7 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// The chart of `shellock test --compare` with its defaults.
+/// Draws the chart of `shellock test --compare` with its defaults.
 pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let made = &kit.design.kit;
     let (mut plan, mut turn) = (kit.settings.plan.clone(), Turn::default());

@@ -1,4 +1,4 @@
-//! From the kit to the printer and the workbench.
+//! Pictures of printing and assembling the kit.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -11,12 +11,13 @@ use super::draw::{PALE, plain};
 use super::kit::Kit;
 use super::sheet::{DENSITY, Sheet, WIDTH, hex, pixels};
 
-/// A face is skin where its middle is so near to the model's surface, mm, as for the kit's plates.
+/// Distance from the model's surface, mm, within which a face's centre makes it skin, as for the kit's
+/// plates.
 const SKIN_MM: f64 = 0.05;
-/// Thickness of the plate that is drawn, mm.
+/// Thickness of the drawn plate, mm.
 const BED_MM: f64 = 2.0;
 
-/// The pieces on the plates of a filament printer and of a resin printer.
+/// Shows the pieces on the plates of a filament printer and of a resin printer.
 pub fn plates(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 320.0];
     let skin = TriangleBvh::new(kit.model.mesh());
@@ -70,7 +71,7 @@ pub fn plates(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// A slab under the bed's area.
+/// Slab under the area of the bed.
 fn bed(printer: &Printer) -> TriMesh {
     let [width, depth, _] = printer.bed_mm;
     let slab = Aabb {
@@ -80,7 +81,7 @@ fn bed(printer: &Printer) -> TriMesh {
     shellock_geom::boolean::Volume::cuboid(slab).to_mesh()
 }
 
-/// Four steps in the middle of the booklet, as its page has them.
+/// Shows four steps from the middle of the booklet, as on its page.
 pub fn booklet(kit: &Kit) -> Vec<u8> {
     let booklet = Booklet {
         title: "squirrel".into(),

@@ -1,4 +1,4 @@
-//! A model with many faults, and what mending makes of it.
+//! Picture of a model with many faults, before and after repair.
 
 use std::path::PathBuf;
 
@@ -14,14 +14,14 @@ use crate::failure::Failure;
 
 const SIZE_MM: f64 = 100.0;
 const CELL_MM: f64 = 1.8;
-/// Every so many triangles one is left out.
+/// Interval at which a triangle is left out.
 const MISSING: usize = 331;
-/// Half the length of a speck: as a body it is shorter than a hundredth of the model.
+/// Half the length of a speck, mm: as a body it is shorter than a hundredth of the model.
 const SPECK_MM: f64 = 0.4;
 const HAT: [u8; 3] = [110, 150, 205];
 const SPECK: [u8; 3] = [30, 130, 70];
 
-/// The figure, with colours that tell its faults.
+/// The figure with its faults, marked by colours.
 struct Broken {
     mesh: TriMesh,
     colors: Vec<[u8; 3]>,
@@ -30,7 +30,7 @@ struct Broken {
     n_specks: usize,
 }
 
-/// Both from outside and cut open, and what was done.
+/// Shows the figure before and after repair, from outside and cut open, and lists the repairs.
 pub fn before_and_after() -> Result<Vec<u8>, Failure> {
     let broken = broken();
     let fault = |problem: String| Failure::Model {
@@ -91,7 +91,7 @@ pub fn before_and_after() -> Result<Vec<u8>, Failure> {
     Ok(sheet.bytes())
 }
 
-/// What is said, in lines that the sheet has room for.
+/// Breaks a text into lines that fit the sheet.
 fn lines(words: &str) -> Vec<String> {
     const MOST: usize = 96;
     let mut lines: Vec<String> = Vec::new();
@@ -120,7 +120,7 @@ fn broken() -> Broken {
     let mut is_at_hole = vec![false; cat.points.len()];
     for (f, &[a, b, c]) in cat.triangles.iter().enumerate() {
         if is_missing(f) && [a, b, c].iter().all(|v| !is_at_hole[*v as usize]) {
-            // Holes that share a point are one hole of more than three edges.
+            // Holes that share a point are one hole with more than three edges.
             [a, b, c].iter().for_each(|v| is_at_hole[*v as usize] = true);
             n_missing += 1;
             continue;

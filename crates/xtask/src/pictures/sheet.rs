@@ -1,4 +1,4 @@
-//! Sheets of pictures and words, and small files of them.
+//! Sheets of pictures and words, written as small files.
 
 use std::fmt::Write;
 
@@ -7,28 +7,28 @@ use base64::engine::general_purpose::STANDARD;
 use shellock_render::stills::Image;
 use shellock_render::svg::{begin, end, text};
 
-/// Width of a sheet, and of the column that it is read in.
+/// Width of a sheet, and of the column in which it is read.
 pub const WIDTH: f64 = 800.0;
-/// Pixels of a still to one of the sheet: sharp on fine screens.
+/// Pixels of a still per pixel of the sheet: sharp on high-resolution screens.
 pub const DENSITY: f64 = 1.5;
-/// Colours of a still.
+/// Number of colours of a still.
 const N_COLORS: usize = 96;
 
-/// Pixels of a still that is so long on the sheet.
+/// Number of pixels of a still for a length on the sheet.
 pub fn pixels(length: f64) -> usize {
     (DENSITY * length).round() as usize
 }
 
-/// An SVG text while it is made.
+/// An SVG text under construction.
 pub struct Sheet(pub String);
 
 impl Sheet {
-    /// White, [`WIDTH`] wide.
+    /// Begins a white sheet, [`WIDTH`] wide.
     pub fn new(height: f64) -> Self {
         Self(begin(WIDTH, height))
     }
 
-    /// A still with its upper left corner at a place, as large as its [`pixels`] say.
+    /// Places a still with its upper left corner at a point; its size follows from [`pixels`].
     pub fn still(&mut self, [x, y]: [f64; 2], still: Image) {
         let [width, height] = [still.width, still.height].map(|n| n as f64 / DENSITY);
         let data = STANDARD.encode(small_png(&still.on([255; 3]), N_COLORS));
@@ -40,23 +40,23 @@ impl Sheet {
         );
     }
 
-    /// Words at the left end of their line.
+    /// Writes words that begin at a point.
     pub fn words(&mut self, at: [f64; 2], words: &str) {
         text(&mut self.0, at, "fill=\"#222\"", words);
     }
 
-    /// Words in the middle of a line.
+    /// Writes words centred at a point.
     pub fn amid(&mut self, at: [f64; 2], words: &str) {
         text(&mut self.0, at, "fill=\"#222\" text-anchor=\"middle\"", words);
     }
 
-    /// The same, fainter and smaller.
+    /// Writes words centred at a point, fainter and smaller.
     pub fn note(&mut self, at: [f64; 2], words: &str) {
         let style = "fill=\"#555\" text-anchor=\"middle\" font-size=\"13\"";
         text(&mut self.0, at, style, words);
     }
 
-    /// A filled polygon; `style` has more attributes.
+    /// Draws a filled polygon; `style` has more attributes.
     pub fn polygon(&mut self, corners: &[[f64; 2]], fill: &str, style: &str) {
         let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
         let _ = writeln!(
@@ -66,7 +66,7 @@ impl Sheet {
         );
     }
 
-    /// A straight line.
+    /// Draws a straight line.
     pub fn line(&mut self, [a, b]: [[f64; 2]; 2], style: &str) {
         let _ = writeln!(
             self.0,
@@ -75,7 +75,7 @@ impl Sheet {
         );
     }
 
-    /// A disc of a piece's colour with its number.
+    /// Draws a disc in a piece's colour with its number.
     pub fn numbered(&mut self, middle: [f64; 2], color: [u8; 3], number: u32) {
         let [x, y] = middle;
         let _ = writeln!(
@@ -86,13 +86,13 @@ impl Sheet {
         self.amid([x, y + 5.0], &number.to_string());
     }
 
-    /// The file.
+    /// Ends the sheet and returns the bytes of its file.
     pub fn bytes(self) -> Vec<u8> {
         end(self.0).into_bytes()
     }
 }
 
-/// An SVG text with its embedded stills in as few colours as those of a sheet.
+/// Reduces the colours of the stills embedded in an SVG text to those of a sheet's stills.
 pub fn with_small_stills(svg: &str) -> String {
     const START: &str = "data:image/png;base64,";
     let mut parts = svg.split(START);
@@ -108,7 +108,7 @@ pub fn with_small_stills(svg: &str) -> String {
     text
 }
 
-/// A still of four channels, as the program makes them.
+/// Decodes a still of four channels, as the program makes them; `None` for anything else.
 fn decoded(data: &str) -> Option<Image> {
     let bytes = STANDARD.decode(data).ok()?;
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
@@ -121,12 +121,12 @@ fn decoded(data: &str) -> Option<Image> {
     })
 }
 
-/// A colour as SVG names it.
+/// Writes a colour in SVG notation.
 pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// A still on white with pictures in it.
+/// Places pictures on a white still of this size.
 pub fn pasted([width, height]: [usize; 2], pictures: &[([usize; 2], Image)]) -> Image {
     let mut rgba = vec![255; 4 * width * height];
     for ([left, top], picture) in pictures {
@@ -138,7 +138,7 @@ pub fn pasted([width, height]: [usize; 2], pictures: &[([usize; 2], Image)]) -> 
     Image { width, height, rgba }
 }
 
-/// An opaque still as a PNG file with a palette of at most `n` colours, 256 at most.
+/// Encodes an opaque still as a PNG file with a palette of at most `n` colours, and white; 256 at most.
 pub fn small_png(still: &Image, n: usize) -> Vec<u8> {
     let palette = palette(still, n);
     let nearest = |cell: usize| {
@@ -175,7 +175,7 @@ pub fn small_png(still: &Image, n: usize) -> Vec<u8> {
     bytes
 }
 
-/// Five bits of each channel.
+/// Index of a pixel's colour, with five bits of each channel.
 fn cell(pixel: &[u8]) -> usize {
     pixel[..3]
         .iter()
@@ -183,12 +183,12 @@ fn cell(pixel: &[u8]) -> usize {
 }
 
 fn middle(cell: usize) -> [u8; 3] {
-    // From 0 to 255, so that white stays white.
+    // The scale runs from 0 to 255, so that white stays white.
     [10, 5, 0].map(|shift| ((cell >> shift & 31) * 255 / 31) as u8)
 }
 
-/// Colours that stand for those of a still: boxes of colours, cut in two at the median, the widest and
-/// fullest first [Heckbert 1982].
+/// Palette for the colours of a still: boxes of colours, split at the median, the widest and fullest first
+/// [Heckbert 1982]. White is always included.
 fn palette(still: &Image, n: usize) -> Vec<[u8; 3]> {
     let mut count = vec![0_u64; 1 << 15];
     still.rgba.chunks_exact(4).for_each(|p| count[cell(p)] += 1);
@@ -235,7 +235,7 @@ fn palette(still: &Image, n: usize) -> Vec<[u8; 3]> {
         })
     };
     let mut palette: Vec<[u8; 3]> = boxes.iter().map(mean).collect();
-    // The ground stays white.
+    // The background stays white.
     palette.truncate(255);
     palette.push([255; 3]);
     palette
