@@ -1,4 +1,4 @@
-//! `batch`: a folder of models, some of which are none.
+//! Tests of `batch` on a folder in which some files are not valid models.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn told(o: &Output) -> String {
     String::from_utf8_lossy(&o.stdout).into_owned() + &String::from_utf8_lossy(&o.stderr)
 }
 
-/// Slow (some 10 s): two kits.
+/// Slow test (some 10 s): makes two kits.
 #[test]
 fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
     let dir = tempfile::tempdir().unwrap();
@@ -37,7 +37,7 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
         said.contains("1 of 2 models have a kit that passes every check"),
         "{said}"
     );
-    // The same kit as alone.
+    // The kit has the same bytes as one made alone.
     shellock(
         dir.path(),
         &format!("build models/below/vase.stl -o alone {options}"),
@@ -58,7 +58,7 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
             .unwrap()
             .contains("below/vase/pieces.png")
     );
-    // Again: nothing is made. A kit that is gone is made again, and one of other options.
+    // A second run makes nothing. A kit that was deleted, or that has other options, is made again.
     let again = told(&shellock(dir.path(), &job));
     assert_eq!(again.matches("as it was").count(), 2, "{again}");
     fs::remove_dir_all(dir.path().join("kits/below/vase")).unwrap();
@@ -67,7 +67,7 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
         third.contains("vase.stl verified") && !third.contains("as it was"),
         "{third}"
     );
-    // A kit that stays though its model is refused now is told in the table.
+    // The table says so when a kit remains although its model is refused now.
     fs::write(dir.path().join("models/below/vase.stl"), "solid\n").unwrap();
     shellock(dir.path(), &job);
     let table = String::from_utf8(bytes("kits", "batch.csv")).unwrap();
@@ -104,7 +104,7 @@ fn an_interrupt_ends_all_of_them_and_leaves_no_half_kit() {
     let ended = { child }.wait().unwrap();
     assert_eq!(ended.code(), Some(130));
     assert!(since.elapsed() < Duration::from_secs(15));
-    // Processes that were asked to end do so, and take what they began along.
+    // Stopped child processes end by themselves and remove what they have begun.
     std::thread::sleep(Duration::from_millis(1500));
     let left: Vec<_> = fs::read_dir(dir.path().join("kits"))
         .unwrap()

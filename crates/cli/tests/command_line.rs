@@ -1,4 +1,4 @@
-//! The program as a user meets it.
+//! Tests of the program through its command line.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn errors(o: &Output) -> String {
     String::from_utf8_lossy(&o.stderr).into_owned()
 }
 
-/// All files below `folder` with their content, sorted.
+/// Lists all files below `folder` with their content, sorted.
 fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -42,7 +42,7 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// Slow (some 20 s): two whole jobs.
+/// Slow test (some 20 s): makes two whole kits.
 #[test]
 fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
@@ -141,7 +141,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
 #[test]
 fn an_open_surface_is_refused_with_its_place() {
     let dir = tempfile::tempdir().unwrap();
-    // A box without a lid.
+    // The surface is a box without a lid.
     let open = "v 0 0 0\nv 30 0 0\nv 30 30 0\nv 0 30 0\nv 0 0 30\nv 30 0 30\nv 30 30 30\nv 0 30 30\n\
                 f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     fs::write(dir.path().join("open.obj"), open).unwrap();
@@ -196,7 +196,7 @@ fn the_configuration_file_stands_behind_the_command_line_and_is_named_where_it_i
     assert!(e.contains("clearance") && e.contains("thickness"), "{e}");
     let e = told(both, &["demo", "--clearance", "0.1"]);
     assert!(!e.contains("clearance") && e.contains("thickness"), "{e}");
-    // A size on the command line goes before a height in the file.
+    // A size on the command line overrides a height in the file.
     let e = told("height = 90\nthickness = 99\n", &["demo", "--size", "100"]);
     assert!(!e.contains("cannot be used") && e.contains("thickness"), "{e}");
     for (config, words) in [
@@ -212,7 +212,7 @@ fn the_configuration_file_stands_behind_the_command_line_and_is_named_where_it_i
         let e = told(config, &["demo"]);
         assert!(words.iter().all(|w| e.contains(w)), "{config}: {e}");
     }
-    // The printer's own wall is taken where none is given.
+    // The printer's own minimum wall is used if none is given.
     let mine = "printer = \"mine\"\nclearance = 7\n[printers.mine]\nlike = \"fdm\"\nmin-wall = 1.9\n";
     assert!(told(mine, &["demo"]).contains("clearance"));
     let e = told("", &["demo", "--config", "nowhere.toml"]);
@@ -352,7 +352,7 @@ fn what_is_not_there_is_named() {
     assert!(errors(&o).contains("squirrel"));
 }
 
-/// The figure cube of the tests: closed, one body; its faces have the labels `label`.
+/// Cube for the tests: closed, one body, with the labels `label` on its faces.
 fn labelled_cube(label: [i32; 12]) -> String {
     let mut ply = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
@@ -375,12 +375,12 @@ fn labelled_cube(label: [i32; 12]) -> String {
     ply
 }
 
-/// What `test` reads of a plan of two pieces.
+/// Entries that `test` reads from a plan of two pieces.
 const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 1, "installation_direction": [0, 0, 1] },
     { "id": 2, "installation_direction": [0, 0, -1] } ], "installation_order": [1, 2], "up": [0, 0, 1],
     "shell_thickness": 2, "connector_size": 2.5 }"#;
 
-/// The same with the files of its pieces.
+/// Adds the files of the pieces to a plan of two pieces.
 fn with_files(plan: &str) -> String {
     plan.replace("\"id\": 1,", "\"id\": 1, \"file\": \"box.stl\",")
         .replace("\"id\": 2,", "\"id\": 2, \"file\": \"lid.stl\",")
@@ -462,7 +462,7 @@ fn blows_that_are_none_are_refused() {
     }
 }
 
-/// A lid that lies on a box.
+/// The kit is a lid that lies loosely on a box.
 #[test]
 fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() {
     let dir = tempfile::tempdir().unwrap();
@@ -616,7 +616,8 @@ fn what_is_no_fit_or_no_file_leaves_the_configuration_as_it_is() {
     assert_eq!(content(dir.path()).len(), 2);
 }
 
-/// Stages that look for it end by themselves; within a boolean the program ends from outside.
+/// Stages that check for the interrupt end by themselves; during a boolean, the process is ended from
+/// outside.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_a_job_anywhere_and_leaves_nothing() {

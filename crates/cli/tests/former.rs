@@ -1,4 +1,4 @@
-//! Kits of program 0.1, which numbered pieces from 0, are read by all that read kits.
+//! Tests that every program that reads kits also reads those of program 0.1, which numbered pieces from 0.
 
 use std::fs;
 use std::path::Path;
@@ -16,13 +16,13 @@ fn shellock(folder: &Path, args: &str) -> Output {
         .unwrap()
 }
 
-/// The exit code, and all that was said.
+/// Exit code, and all output.
 fn ended(o: &Output) -> (Option<i32>, String) {
     let said = [&o.stdout[..], &o.stderr].concat();
     (o.status.code(), String::from_utf8_lossy(&said).into_owned())
 }
 
-/// The same with all numbers of pieces, and of pieces' files, less by 1.
+/// Subtracts 1 from all piece numbers, also in the names of piece files.
 fn numbered_from_0(value: &mut Value) {
     const ONE: [&str; 15] = [
         "a",
@@ -67,7 +67,7 @@ fn numbered_from_0(value: &mut Value) {
     }
 }
 
-/// `pieces/piece-00.stl` for `pieces/piece-01.stl`.
+/// Returns `pieces/piece-00.stl` for `pieces/piece-01.stl`, and so on.
 fn file_from_0(file: &str) -> String {
     let digits: String = file.chars().filter(char::is_ascii_digit).collect();
     format!("pieces/piece-{:02}.stl", digits.parse::<u32>().unwrap() - 1)
@@ -79,7 +79,7 @@ fn change(file: &Path, change: impl FnOnce(&mut Value)) {
     fs::write(file, serde_json::to_vec(&value).unwrap()).unwrap();
 }
 
-/// Makes of a kit what program 0.1 would have written.
+/// Changes a kit into the form that program 0.1 wrote.
 fn make_former(kit: &Path) {
     change(&kit.join("plan.json"), |plan| {
         for piece in plan["pieces"].as_array().unwrap() {
@@ -111,7 +111,7 @@ fn assert_confirmed(kit: &Path) {
     assert!(refuted.is_none(), "{}", refuted.unwrap());
 }
 
-/// Slow (some 20 s): a kit, and all that can be asked of it.
+/// Slow test (some 20 s): makes a kit and runs every command that reads one.
 #[test]
 fn kits_of_program_0_1_are_read_by_all_that_read_kits() {
     let dir = tempfile::tempdir().unwrap();
@@ -130,7 +130,7 @@ fn kits_of_program_0_1_are_read_by_all_that_read_kits() {
         let (code, said) = ended(&shellock(folder, command));
         assert_eq!(code, Some(0), "{command}: {said}");
     }
-    // `verify` wrote a certificate of today beside the former plan.
+    // `verify` wrote a certificate of the present version beside the former plan.
     let certificate: Value =
         serde_json::from_slice(&fs::read(kit.join("certificate.json")).unwrap()).unwrap();
     assert_eq!(certificate["version"], 4);

@@ -1,15 +1,15 @@
-//! Kits of the program's own figures are what they were, byte for byte.
+//! Tests that kits of the program's own figures are unchanged, byte for byte.
 
 use std::path::Path;
 
 use shellock_testkit::golden::{Goldens, QUICK, machine, of_figures, run};
 
-/// Slow (some seconds a kit). What changes on purpose is written anew by `cargo xtask golden --update`.
+/// Slow test (some seconds a kit). `cargo xtask golden --update` rewrites the digests after intended changes.
 #[test]
 fn kits_of_figures_are_what_they_were() {
     let goldens = Goldens::read(&of_figures()).unwrap();
     if goldens.machine != machine() {
-        // Sums of vector units and of other C libraries differ in their last bits.
+        // Sums on other vector units or with other C libraries differ in their last bits.
         eprintln!(
             "skipped: digests are of \"{}\", this is \"{}\"",
             goldens.machine,

@@ -1,8 +1,9 @@
-//! Every command of the guides runs: one that no longer exists, or whose options have other names, fails here.
+//! Tests that every command of the guides runs. A command that no longer exists, or whose options were
+//! renamed, fails.
 //!
-//! The `sh` blocks of a guide are run in order in a folder of its own, with figures made by code in place of a
-//! reader's files. What makes a kit gets options that make it soon, but for those that the guide names. Python's
-//! blocks run in python/tests.
+//! The `sh` blocks of a guide are run in order in a folder of their own, with generated figures in place of
+//! the reader's files. Commands that make a kit get options that make it quickly, unless the guide sets them.
+//! Python blocks run in python/tests.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +12,7 @@ use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Commands that are not run, by how they begin, and why.
+/// Commands that are not run: how each begins, and the reason.
 const NOT_RUN: [(&str, &str); 6] = [
     ("cargo install ", "builds the program once more"),
     ("scripts/test", "runs this test"),
@@ -30,11 +31,11 @@ const NOT_RUN: [(&str, &str); 6] = [
     ),
 ];
 
-/// Guides whose kits are made; of the others commands are only understood, unless SHELLOCK_GUIDES is `all`: with
-/// `--help` behind them they end at once, or at an option that there is not.
+/// Guides whose kits are made. Commands of the others are only parsed, unless SHELLOCK_GUIDES is `all`: with
+/// `--help` at the end they stop at once, or at an option that does not exist.
 const IN_FULL: [&str; 3] = ["README.md", "batch.md", "getting-started.md"];
 
-/// What is added to a command that does not say otherwise: few pieces, soon.
+/// Options added to a command that does not set them, for few pieces and a quick run.
 const SOON: [(&str, &str); 4] = [
     ("--time", "0"),
     ("--method", "creases"),
@@ -46,7 +47,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The guides and the README, by name.
+/// Paths of the guides and of the README, sorted by name.
 fn guides() -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = fs::read_dir(root().join("docs/guide"))
         .unwrap()
@@ -58,7 +59,7 @@ fn guides() -> Vec<PathBuf> {
     all
 }
 
-/// The commands of a guide's `sh` blocks, without comments.
+/// Extracts the commands of a guide's `sh` blocks, without comments.
 fn commands(guide: &str) -> Vec<String> {
     let mut is_shell = false;
     let mut found = Vec::new();
@@ -74,7 +75,7 @@ fn commands(guide: &str) -> Vec<String> {
     found
 }
 
-/// What is added to the arguments of the program.
+/// Options to add to the program's arguments.
 fn added(args: &[&str]) -> Vec<String> {
     let has = |option: &str| args.contains(&option);
     let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
@@ -99,7 +100,7 @@ fn added(args: &[&str]) -> Vec<String> {
     }
 }
 
-/// The files that guides speak of.
+/// Creates the files that the guides mention.
 fn prepare(folder: &Path, torus: &[u8]) {
     fs::create_dir(folder.join("models")).unwrap();
     for file in ["figure.stl", "dragon.stl", "models/figure.stl"] {
@@ -107,20 +108,20 @@ fn prepare(folder: &Path, torus: &[u8]) {
     }
 }
 
-/// Whether a guide's kits are made.
+/// Returns true if the guide's kits are made.
 fn is_in_full(guide: &Path) -> bool {
     let name = guide.file_name().unwrap().to_str().unwrap();
     IN_FULL.contains(&name) || std::env::var("SHELLOCK_GUIDES").is_ok_and(|which| which == "all")
 }
 
-/// Runs a command in `folder`, or only has it understood; what went wrong.
+/// Runs a command in `folder`, or only has it parsed; fails with the program's output.
 fn run(folder: &Path, command: &str, is_in_full: bool) -> Result<(), String> {
     let program = command
         .strip_prefix("cargo run --release -- ")
         .or(command.strip_prefix("shellock "));
     let Some(args) = program else {
         return match command.strip_prefix("shellock-check ") {
-            // A program of another crate.
+            // This command is a program of another crate.
             Some(_) if !is_in_full => Ok(()),
             Some(kit) => shellock_check::check(&folder.join(kit)).map(drop),
             None => Err("no command of this program, and not among those that are not run".into()),
@@ -138,7 +139,7 @@ fn run(folder: &Path, command: &str, is_in_full: bool) -> Result<(), String> {
         .stdin(Stdio::null())
         .output()
         .unwrap();
-    // With 1 it ran, and the kit fails a check: whether kits pass is not asked here.
+    // With exit code 1 the command ran, but its kit fails a check. This test does not ask whether kits pass.
     if matches!(output.status.code(), Some(0 | 1)) {
         return Ok(());
     }
@@ -146,7 +147,7 @@ fn run(folder: &Path, command: &str, is_in_full: bool) -> Result<(), String> {
     Err(format!("{}\n{}", output.status, String::from_utf8_lossy(&said)))
 }
 
-/// Slow (half a minute on two cores): kits.
+/// Slow test (half a minute on two cores): makes kits.
 #[test]
 fn every_command_of_the_guides_runs() {
     let made = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Files as people have them, good and bad, each made by code: what becomes of them, and what is said.
+//! Tests of typical input files, good and bad, all generated: the outcome of each, and the messages.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -19,7 +19,7 @@ fn shellock(folder: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
-/// A ball of 512 triangles, 60 mm wide, around `center`.
+/// Ball of 512 triangles, 60 mm wide, around `center`.
 fn ball(center: Vec3) -> TriMesh {
     shapes::ball(3, center, 30.0)
 }
@@ -79,7 +79,7 @@ fn package(model: &str) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// A 3MF of the ball as object 1, in inches.
+/// 3MF model with the ball as object 1, in inches.
 fn three_mf(mesh: &TriMesh, more: &str, build: &str) -> String {
     let mut model = "<model unit=\"inch\"><resources><object id=\"1\"><mesh><vertices>".to_owned();
     let inch = 1.0 / 25.4;
@@ -100,20 +100,20 @@ fn three_mf(mesh: &TriMesh, more: &str, build: &str) -> String {
     model + "</triangles></mesh></object>" + more + "</resources><build>" + build + "</build></model>"
 }
 
-/// What becomes of a file.
+/// Expected outcome for a file.
 enum Outcome {
-    /// It can be made as it is.
+    /// The file can be made as it is.
     Sound,
-    /// It can be made after these repairs.
+    /// The file can be made after these repairs.
     Repaired(&'static [&'static str]),
-    /// It is refused with these words.
+    /// The file is refused with these words.
     Refused(&'static [&'static str]),
 }
 use Outcome::{Refused, Repaired, Sound};
 
 type Twin = (&'static str, Vec<u8>, Outcome);
 
-/// Broken or odd as files.
+/// Files that are broken or odd in their format.
 fn odd_files() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
     let stl = write_stl_binary(&good);
@@ -157,7 +157,7 @@ fn odd_files() -> Vec<Twin> {
     ]
 }
 
-/// Broken or odd as surfaces.
+/// Files that are broken or odd in their surface.
 fn odd_surfaces() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
     let unwelded = TriMesh {
@@ -400,13 +400,13 @@ fn a_division_is_told_in_figures_and_is_the_one_that_segment_makes() {
     for words in ["on the front", "eight views", "held", "piece  area, mm²"] {
         assert!(told.contains(words), "{told}");
     }
-    // Of labels that are given, those.
+    // Given labels define the division.
     let given = json(&["inspect", "parts.ply", "--segment"]);
     assert_eq!(given["division"]["n_pieces"], made["pieces"]);
     assert!(json(&["inspect", "ball.ply"])["division"].is_null());
 }
 
-/// A ball of 60 mm with walls of 2.4 mm and a hole of 4 mm underneath.
+/// Ball of 60 mm with walls of 2.4 mm and a hole of 4 mm underneath.
 fn drained() -> TriMesh {
     let [outer, inner] = [30.0, 27.6].map(|radius| {
         let ball = shapes::ball(4, Vec3::ZERO, radius);
@@ -452,12 +452,12 @@ fn a_hollow_model_is_told_with_its_wall_and_opening_and_filled_if_asked() {
     };
     let filled = told(&["drained.stl", "--fill", "--size", "120"]);
     assert_eq!(filled["repairs"][0]["kind"], "openings-closed", "{filled}");
-    // In the file's units, where the note has the made thing's.
+    // Repairs use the file's units; the note uses those of the kit.
     let z = filled["repairs"][0]["at"][2].as_f64().unwrap();
     assert!((z + 29.9).abs() < 0.1, "{z}");
     let note = filled["notes"].to_string();
     assert!(note.contains("1 opening was closed, 8.0 mm wide near"), "{note}");
-    // Walls of 4.8 mm are made hollow, if those of the kit are thin.
+    // Walls of 4.8 mm are made hollow themselves if the kit's walls are thin.
     let kept = told(&["drained.stl", "--size", "120", "--thickness", "0.8"]);
     assert!(kept["notes"].to_string().contains("hollow already"), "{kept}");
     fs::write(dir.path().join("ball.stl"), write_stl_binary(&ball(Vec3::ZERO))).unwrap();

@@ -1,4 +1,4 @@
-//! `verify` on assemblies that nobody here made.
+//! Tests of `verify` on assemblies that were not made by this program.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use shellock_formats::{read_mesh, write_stl_binary};
 use shellock_testkit::shapes::PinnedLid;
 
-/// A base, a lid that slides along x, and a pin through both from above that reaches down to `pin_z`.
+/// Writes a base, a lid that slides along x, and a pin from above through both that reaches down to `pin_z`.
 fn write_pieces(folder: &Path, pin_z: f64) {
     let lid = PinnedLid {
         gap_mm: 0.1,
@@ -51,13 +51,13 @@ fn boxes_that_lock_pass_and_boxes_that_do_not_fail() {
             .iter()
             .any(|c| c["claim"] == "locked")
     );
-    // A pin that ends above the rail holds nothing.
+    // A pin that ends above the rail locks nothing.
     write_pieces(dir.path(), 16.0);
     let o = verify(dir.path(), ASSEMBLY);
     assert_eq!(o.status.code(), Some(1));
 }
 
-/// The same assembly, turned by 20° about z and then by 35° about x.
+/// The assembly above, turned by 20° about z and then by 35° about x.
 #[test]
 fn an_assembly_that_lies_askew_is_judged_as_it_was() {
     let dir = tempfile::tempdir().unwrap();

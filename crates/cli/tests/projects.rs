@@ -1,4 +1,4 @@
-//! Project files: what the studio writes, `build`, `segment`, `plan` and `inspect` read.
+//! Tests of project files, which the studio writes and `build`, `segment`, `plan` and `inspect` read.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn errors(o: &Output) -> String {
     String::from_utf8_lossy(&o.stderr).into_owned()
 }
 
-/// A project of a ring whose halves are labelled, with these lines before its model.
+/// Writes a project of a ring whose halves are labelled, with these lines before its model.
 fn project(folder: &Path, lines: &str) {
     let ring = torus(40.0, 12.0, [60, 24]);
     let bytes = write_stl_binary(&ring);
@@ -51,7 +51,7 @@ fn a_project_means_what_its_options_mean_on_the_command_line() {
     assert!(by_hand.status.success(), "{}", errors(&by_hand));
     let read = |name: &str| fs::read(dir.path().join(name)).unwrap();
     assert!(!read("a.seg").is_empty() && read("a.seg") == read("b.seg"));
-    // What is given on the command line stands before the project.
+    // Options on the command line override the project.
     let ended = |args: &str| shellock(dir.path(), &args.split(' ').collect::<Vec<_>>());
     assert!(
         ended("segment ring.shellock.toml --size 60mm -o c.seg")

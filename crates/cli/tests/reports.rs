@@ -1,7 +1,8 @@
-//! Files after public bug reports, each made by code, with the one right answer that a user would expect.
+//! Tests with generated files after public bug reports, each with the one answer that a user would expect.
 //!
-//! One test writes them into a folder and reads that folder. The table of docs/guide/inputs.md says of each format
-//! what is read, left out and refused; every entry is proven by a case here, and every proof stands there.
+//! One test writes all files into a folder and reads that folder. The table of docs/guide/inputs.md says for
+//! each format what is read, left out and refused. A case here proves every entry, and every proof is listed
+//! there.
 
 #[path = "reports/gltf.rs"]
 mod gltf;
@@ -19,32 +20,32 @@ use serde_json::Value;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_testkit::shapes;
 
-/// Right sizes are met within this, mm.
+/// Largest allowed error of a size, mm.
 const TOLERANCE_MM: f64 = 0.05;
 
-/// What `inspect` says of a file.
+/// Claim about the answer of `inspect` for a file.
 #[derive(Clone, Copy, Debug)]
 enum Claim {
-    /// Size of what would be made, mm.
+    /// Size of the kit that would be made, mm.
     Size([f64; 3]),
-    /// The file is divided by this.
+    /// Source of the file's division.
     Labels(&'static str),
-    /// A note has these words.
+    /// Words that a note contains.
     Note(&'static str),
-    /// A warning has these words.
+    /// Words that a warning contains.
     Warning(&'static str),
-    /// It is refused with these words.
+    /// Words with which the file is refused.
     Refused(&'static str),
 }
 
-/// A file, and the right answer.
+/// A file with its expected answer.
 #[derive(Clone)]
 struct Case {
     name: &'static str,
     bytes: Vec<u8>,
     options: Vec<&'static str>,
     claims: Vec<Claim>,
-    /// Format, column and entry of the guide's table.
+    /// Format, column and entry in the guide's table that the case proves.
     proof: Option<[&'static str; 3]>,
 }
 
@@ -75,7 +76,7 @@ impl Case {
     }
 }
 
-/// A body of 512 triangles, 60 × 40 × 30 mm.
+/// Body of 512 triangles, 60 × 40 × 30 mm.
 fn body() -> TriMesh {
     scaled(&shapes::ball(3, Vec3::ZERO, 1.0), Vec3::new(30.0, 20.0, 15.0))
 }
@@ -96,7 +97,7 @@ fn cases() -> Vec<Case> {
     [threemf::cases(), gltf::cases(), plain::cases()].concat()
 }
 
-/// What is wrong with what `inspect` says of the file of `case` in `folder`.
+/// Lists the differences between the claims of `case` and the answer of `inspect` for its file in `folder`.
 fn faults(folder: &Path, case: &Case) -> Vec<String> {
     let output = Command::new(env!("CARGO_BIN_EXE_shellock"))
         .current_dir(folder)
@@ -124,7 +125,7 @@ fn faults(folder: &Path, case: &Case) -> Vec<String> {
                 let made = report["size_mm"][axis].as_f64().unwrap_or(f64::NAN);
                 (made - mm[axis]).abs() <= TOLERANCE_MM
             }),
-            // Labels of the file may be in a JSON text, where quotes have a backslash.
+            // The file's labels may be inside a JSON text, where quotes have a backslash.
             Claim::Labels(source) => texts("divided_by").contains(source),
             Claim::Note(words) => texts("notes").replace("\\\"", "\"").contains(words),
             Claim::Warning(words) => texts("warnings").replace("\\\"", "\"").contains(words),

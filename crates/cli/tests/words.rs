@@ -1,4 +1,4 @@
-//! What the program says: help that fits a screen, units, and one verdict.
+//! Tests of the program's messages: help that fits a screen, units, and a single verdict.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -44,7 +44,7 @@ fn the_help_of_every_command_fits_a_screen_and_has_an_example_where_it_makes_som
         let help = said(&shellock(dir.path(), &[command, "-h"]));
         assert!(help.contains(&format!("  shellock {command} ")), "{command}");
     }
-    // What dividing has no use for is not in its help.
+    // Options that dividing does not use are not in its help.
     let segment = said(&shellock(dir.path(), &["segment", "--help-all"]));
     assert!(!segment.contains("--no-booklet") && segment.contains("--keep-whole"));
 }

@@ -1,4 +1,4 @@
-//! glTF after what generators and modellers write, made by code.
+//! Generated glTF files like those of generators and modelling programs.
 
 use serde_json::{Value, json};
 use shellock_geom::{TriMesh, Vec3};
@@ -6,19 +6,19 @@ use shellock_geom::{TriMesh, Vec3};
 use super::{Case, Claim, body, scaled};
 use Claim::{Labels, Note, Refused, Size, Warning};
 
-/// Floats of a column-major identity.
+/// Identity matrix in column-major order.
 const IDENTITY: [f32; 16] = [
     1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
 ];
 
-/// A GLB that is put together.
+/// A GLB file under construction.
 struct Glb {
     json: Value,
     data: Vec<u8>,
 }
 
 impl Glb {
-    /// A mesh in metres, shown by node 0.
+    /// Creates a file with a mesh in metres, shown by node 0.
     fn of(mesh: &TriMesh) -> Self {
         let mut glb = Self {
             json: json!({ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
@@ -87,7 +87,7 @@ impl Glb {
     }
 }
 
-/// The body in metres: 60 × 40 × 30 mm.
+/// Body in metres: 60 × 40 × 30 mm.
 fn metres() -> TriMesh {
     scaled(&body(), Vec3::splat(1e-3))
 }
@@ -96,12 +96,12 @@ fn n_points() -> usize {
     body().points.len()
 }
 
-/// All cases of glTF.
+/// All cases of glTF files.
 pub fn cases() -> Vec<Case> {
     [skins(), morphs(), copies(), extensions(), sizes(), others()].concat()
 }
 
-/// A skin of one joint for all points; the joint is node 1.
+/// Adds a skin with one joint for all points; the joint is node 1.
 fn skinned(glb: &mut Glb, inverse_bind: [f32; 16]) {
     let n = n_points();
     let joints = glb.accessor(&vec![0; 4 * n], 5121, "VEC4", n);
@@ -114,12 +114,12 @@ fn skinned(glb: &mut Glb, inverse_bind: [f32; 16]) {
 }
 
 fn skins() -> Vec<Case> {
-    // The joint doubles; the node's own scale is ignored.
+    // The joint doubles the size; the node's own scale is ignored.
     let mut posed = Glb::of(&metres());
     skinned(&mut posed, IDENTITY);
     posed.json["nodes"] = json!([{ "mesh": 0, "skin": 0, "scale": [9, 9, 9] }, { "scale": [2, 2, 2] }]);
     posed.json["scenes"] = json!([{ "nodes": [0, 1] }]);
-    // Joint and inverse bind matrix cancel: a model in centimetres that is shown in metres.
+    // Joint and inverse bind matrix cancel out: a model in centimetres is shown in metres.
     let mut bound = Glb::of(&scaled(&metres(), Vec3::splat(100.0)));
     let mut inverse = IDENTITY;
     [0, 5, 10].into_iter().for_each(|k| inverse[k] = 0.01);
@@ -136,7 +136,7 @@ fn skins() -> Vec<Case> {
 fn morphs() -> Vec<Case> {
     let morphed = |name: &'static str, of_mesh: Option<f32>, of_node: Option<f32>| {
         let mut glb = Glb::of(&metres());
-        // The target makes it twice as high.
+        // The morph target doubles the height.
         let deltas: Vec<f32> = metres()
             .points
             .iter()
@@ -212,7 +212,7 @@ fn extensions() -> Vec<Case> {
         let end = at + bytes[at..].iter().position(|&b| b == b']').expect("it ends") + 1;
         let length_before = bytes.len();
         bytes.splice(at..end, text.iter().copied());
-        // Blanks after the text keep the chunks where their lengths say.
+        // The stated length of the JSON chunk grows with its text, so that the chunks stay readable.
         let json_length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes"));
         let grown = (bytes.len() - length_before) as u32;
         bytes[12..16].copy_from_slice(&(json_length + grown).to_le_bytes());

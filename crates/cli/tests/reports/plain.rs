@@ -1,4 +1,4 @@
-//! STL, OBJ, PLY and OFF, and surfaces that need a decision, made by code.
+//! Generated STL, OBJ, PLY and OFF files, and surfaces that need a decision of their owner.
 
 use std::fmt::Write as _;
 
@@ -33,7 +33,7 @@ fn coloured_ply() -> Vec<u8> {
     text.into_bytes()
 }
 
-/// An OBJ; `more` are numbers after the coordinates of a point.
+/// Writes an OBJ text; `more` gives further numbers after the coordinates of a point.
 fn obj(mesh: &TriMesh, more: impl Fn(Vec3) -> String) -> String {
     let mut text = String::new();
     for p in &mesh.points {
@@ -57,7 +57,7 @@ fn off(mesh: &TriMesh) -> String {
     text
 }
 
-/// The body with two materials, left and right.
+/// Writes the body as an OBJ text with two materials, left and right.
 fn two_materials(left: &str, right: &str) -> String {
     let mesh = body();
     let mut text = String::new();
@@ -74,7 +74,7 @@ fn two_materials(left: &str, right: &str) -> String {
     text
 }
 
-/// A prism 30 × 30 × 20 mm whose ends are polygons in the shape of a U.
+/// Prism of 30 × 30 × 20 mm whose ends are polygons in the shape of a U.
 fn notch() -> String {
     let u = [
         [0, 0],
@@ -214,7 +214,7 @@ fn stl(volume: &Volume) -> Vec<u8> {
     write_stl_binary(&volume.to_mesh())
 }
 
-/// The body, with walls of 2.4 mm and round holes of 4 mm at some places, each bored along z from there on.
+/// Body with walls of 2.4 mm and round holes of 4 mm, bored along z from the given places outwards.
 fn drained(holes: &[[f64; 3]]) -> Volume {
     let volume = |mesh: &TriMesh| Volume::from_closed_mesh(mesh).expect("it is closed");
     let outer = volume(&smooth(Vec3::new(30.0, 20.0, 15.0)));
@@ -232,22 +232,22 @@ fn drained(holes: &[[f64; 3]]) -> Volume {
     })
 }
 
-/// An ellipsoid of 2048 triangles.
+/// Ellipsoid of 2048 triangles with these half axes.
 fn smooth(half_axes: Vec3) -> TriMesh {
     scaled(&shapes::ball(4, Vec3::ZERO, 1.0), half_axes)
 }
 
-/// A box with a slit of a width along its middle.
+/// Box with a slit of this width, mm, across it.
 fn slit(width: f64) -> Volume {
     let block = shapes::cuboid([0.0; 3], [60.0, 40.0, 30.0]);
     block.subtract(&shapes::cuboid([12.0, -1.0, 8.0], [12.0 + width, 41.0, 31.0]))
 }
 
-/// Two boxes side by side with the wall between them left in.
+/// Box with a wall inside that divides it in two.
 fn with_wall(wall_mm: f64) -> TriMesh {
     let mut mesh = shapes::cuboid([0.0; 3], [60.0, 40.0, 30.0]).to_mesh();
     let first = mesh.points.len() as u32;
-    // A sheet across the whole box, which touches it all around.
+    // The wall is a sheet across the whole box that touches it all around.
     let corners = [[0.0, 0.0], [40.0, 0.0], [40.0, 30.0], [0.0, 30.0]];
     mesh.points.extend(corners.map(|[y, z]| Vec3::new(wall_mm, y, z)));
     mesh.triangles
@@ -255,7 +255,7 @@ fn with_wall(wall_mm: f64) -> TriMesh {
     mesh
 }
 
-/// The body, and a smaller one that is inside out and sticks out of it.
+/// The body, with a smaller body that is inside out and sticks out of it.
 fn inside_out() -> Vec<u8> {
     let mut mesh = body();
     let mut tool = scaled(&moved(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0));
@@ -267,7 +267,7 @@ fn inside_out() -> Vec<u8> {
     write_ply(&mesh, None)
 }
 
-/// Surfaces whose shape needs a decision of their owner.
+/// Cases of surfaces that need a decision of their owner.
 fn decisions() -> Vec<Case> {
     let one = [[0.0, 0.0, -15.0]];
     let two = [[0.0, 0.0, -15.0], [10.0, 0.0, 15.0]];

@@ -1,4 +1,4 @@
-//! 3MF packages after what slicers and modellers write, made by code.
+//! Generated 3MF packages like those of slicers and modelling programs.
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -27,7 +27,7 @@ fn package(parts: &[(&str, &str)]) -> Vec<u8> {
     archive.finish().expect("memory takes all bytes").into_inner()
 }
 
-/// A model part; `attributes` are those of its root element.
+/// Writes a model part; `attributes` are those of its root element.
 fn model(attributes: &str, resources: &str, build: &str) -> String {
     format!(
         "<model {attributes} xmlns=\"{MICROSOFT}/core/2015/02\"><resources>{resources}</resources><build>{build}</build></model>"
@@ -77,11 +77,11 @@ fn both([mut a, b]: [TriMesh; 2]) -> TriMesh {
 }
 
 const WHOLE: Claim = Size([60.0, 40.0, 30.0]);
-/// The body without what the smaller one of [`two`] cuts off at its end: both ellipsoids meet at x = 28.3, their
-/// facets a little before.
+/// Size of the body after the smaller one of [`two`] is cut off its end. Both ellipsoids meet at x = 28.3,
+/// their facets a little before.
 const CUT: Claim = Size([58.22, 40.0, 30.0]);
 
-/// All cases of 3MF.
+/// All cases of 3MF files.
 pub fn cases() -> Vec<Case> {
     [
         negative(),
@@ -141,7 +141,7 @@ fn negative() -> Vec<Case> {
     ]
 }
 
-/// Files of which a wrong part, size or role would be taken without a word.
+/// Cases in which a wrong part, size or role could be taken silently.
 fn told() -> Vec<Case> {
     let [a, b] = two();
     let part = object(1, "", &mesh(&a, ""));
