@@ -290,7 +290,7 @@ fn a_missing_piece_or_claim_is_missed() {
         let silent = refuted(|_, certificate, _| {
             certificate["claims"].as_array_mut().unwrap().remove(claim);
         });
-        // A play that is not proven is not claimed, and reported as such.
+        // A claim of play may be missing: play without a proof is reported as unproven.
         let is_play = (1..4).contains(&claim);
         assert_eq!(
             silent.contains(&COMPLETE.to_owned()),
@@ -562,8 +562,8 @@ fn of_lid(made: &Made, change: impl FnOnce(&Path, &mut Value)) -> (Vec<Verdict>,
     )
 }
 
-/// Models a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, less a
-/// clearance of 0.1 mm.
+/// Model of a printed tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each,
+/// less a clearance of 0.1 mm.
 #[test]
 fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
     let ways = [Vec3::X, Vec3::X, Vec3::Z];
@@ -578,7 +578,7 @@ fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
         }
     });
     assert!(borrowed.1.contains(&LID.to_owned()), "{borrowed:?}");
-    // The tongue of the sound lid, filed down to that.
+    // The tongue of the sound lid is filed down to the loose lid's shape.
     let filed = of_lid(&sound, |folder, certificate| {
         replace(folder, certificate, 1, &parts_with_lips(0.2)[1])
     });
