@@ -1,9 +1,9 @@
-//! glTF that is nearly valid, so that skins, morph targets, instances and sparse data are reached:
+//! Fuzzes the reader with nearly valid glTF, which reaches skins, morph targets, instances and sparse data:
 //! `cargo +nightly fuzz run gltf`.
 //!
-//! The bytes choose what a document has: meshes, nodes, skins, and for each of them the accessors that it names. What they choose
-//! seldom is wrong: another index, count, offset or type of number. The data of all accessors are the bytes that are left; in
-//! the second half of them, which has what should be indices, all are less than four.
+//! The bytes choose the contents of a document: meshes, nodes, skins, and the accessors that each of them
+//! names. Rare choices are faults: a wrong index, count, offset or number type. The remaining bytes are the
+//! data of all accessors. The second half of them, which is meant for indices, holds only values below four.
 
 #![no_main]
 
@@ -16,14 +16,14 @@ const POINTS: u64 = 5;
 const COMPONENTS: [u64; 7] = [5120, 5121, 5122, 5123, 5125, 5126, 5130];
 const EXTENSIONS: [&str; 4] = ["KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_materials_unlit", "ACME_x"];
 
-/// Choices of one document, and the accessors so far.
+/// Choices of the fuzzer for one document, and the accessors so far.
 struct Maker<'a, 'b> {
     u: &'a mut Unstructured<'b>,
     accessors: Vec<Value>,
 }
 
 impl Maker<'_, '_> {
-    /// `usual`, or seldom another number: near, far, or beyond everything.
+    /// Returns `usual`, or rarely another number: near, far, or beyond all bounds.
     fn number(&mut self, usual: u64) -> Result<u64> {
         Ok(match self.u.arbitrary::<u8>()? {
             0..=247 => usual,
@@ -38,7 +38,7 @@ impl Maker<'_, '_> {
         Ok(self.u.arbitrary::<u8>()? < of_256)
     }
 
-    /// A number that a transform may have.
+    /// Chooses a number that a transform may have.
     fn float(&mut self) -> Result<Value> {
         Ok(match self.u.arbitrary::<u8>()? {
             0 => json!(1e300),
@@ -52,7 +52,7 @@ impl Maker<'_, '_> {
         (0..n).map(|_| self.float()).collect()
     }
 
-    /// A new accessor of `count` rows, usually dense and of floats; returns its index.
+    /// Adds an accessor of `count` rows, usually dense and with this component type; returns its index.
     fn accessor(&mut self, shape: &str, component: u64, count: u64) -> Result<Value> {
         let component = if self.is_so(30)? { *self.u.choose(&COMPONENTS)? } else { component };
         let offset = 4 * self.u.int_in_range(0..=8)?;
@@ -112,7 +112,7 @@ impl Maker<'_, '_> {
         Ok(json!({ "primitives": primitives, "weights": self.floats(2)? }))
     }
 
-    /// Node `id` of `n`; its children come after it, unless they seldom do not.
+    /// Makes node `id` of `n`. Its children come after it, except in rare faults.
     fn node(&mut self, id: u64, n: u64) -> Result<Value> {
         let mut node = json!({ "children": [] });
         if self.is_so(180)? {
@@ -165,7 +165,8 @@ impl Maker<'_, '_> {
     }
 }
 
-// Panics that are caught and become an error are none: without this the first one would end the process.
+// The fuzzer's panic hook is removed: it would end the process even at panics that are caught and become
+// errors.
 fuzz_target!(init: drop(std::panic::take_hook()), |bytes: &[u8]| {
     let mut u = Unstructured::new(bytes);
     let mut maker = Maker { u: &mut u, accessors: Vec::new() };

@@ -1,7 +1,7 @@
-//! The XML within a 3MF, past the checksums of its archive: `cargo +nightly fuzz run packages`.
+//! Fuzzes the XML within a 3MF, past the checksums of its archive: `cargo +nightly fuzz run packages`.
 //!
-//! Zero bytes part the input into the root model, the settings of slicers, a second model that the root may name as
-//! `/3D/o.model`, and the relations of the package.
+//! Zero bytes divide the input into the root model, the settings of slicers, a second model that the root may
+//! name as `/3D/o.model`, and the relationships of the package.
 
 #![no_main]
 
@@ -11,7 +11,7 @@ use libfuzzer_sys::fuzz_target;
 use shellock_formats::read_mesh;
 use zip::write::SimpleFileOptions;
 
-/// Names of the parts, and which stretch of the input each one is.
+/// Names of the parts, each with the index of its section of the input.
 const PARTS: [(&str, usize); 5] = [
     ("3D/3dmodel.model", 0),
     ("Metadata/Slic3r_PE_model.config", 1),
@@ -20,7 +20,8 @@ const PARTS: [(&str, usize); 5] = [
     ("_rels/.rels", 3),
 ];
 
-// Panics that are caught and become an error are none: without this the first one would end the process.
+// The fuzzer's panic hook is removed: it would end the process even at panics that are caught and become
+// errors.
 fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     let stretches: Vec<&[u8]> = bytes.splitn(4, |&b| b == 0).collect();
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));

@@ -1,7 +1,8 @@
-//! Whatever the bytes are, reading and repairing them ends in an answer: `cargo +nightly fuzz run readers`.
+//! Fuzzes the readers and the repair, which must end in an answer for any bytes: `cargo +nightly fuzz run
+//! readers`.
 //!
-//! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it each has its
-//! turn.
+//! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it, every reader
+//! gets them.
 
 #![no_main]
 
@@ -13,10 +14,11 @@ use shellock_geom::repair::{RepairMode, repair};
 
 const READERS: [&str; 6] = ["stl", "obj", "ply", "off", "gltf", ""];
 
-/// Larger meshes cost time and find nothing more.
+/// Size limit of repaired meshes, triangles: larger ones cost time and find nothing more.
 const MOST_TRIANGLES: usize = 2000;
 
-// Panics that are caught and become an error are none: without this the first one would end the process.
+// The fuzzer's panic hook is removed: it would end the process even at panics that are caught and become
+// errors.
 fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     static CHOSEN: LazyLock<Option<String>> = LazyLock::new(|| std::env::var("READER").ok());
     let is_chosen = |reader: &str| CHOSEN.as_deref().is_none_or(|chosen| chosen == reader);
