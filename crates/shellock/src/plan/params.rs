@@ -39,7 +39,8 @@ pub struct PlanParams {
     pub n_plans: usize,
     /// Number of pieces that the random search may remove in all before it gives up. [1, 10⁸]; 200 000.
     ///
-    /// Bounds hopeless cases, for each of the two tolerances. If plans exist, the search ends long before.
+    /// Bounds hopeless cases, for each counted run length and each of the two tolerances. If plans exist, the
+    /// search ends long before.
     pub max_tries: usize,
     /// Work limit of the exact search: number of pieces revised. [0, 10⁹]; 100 000. With 0, only the trivial
     /// bound 0 is proven.
