@@ -1,4 +1,4 @@
-//! Stages and the whole job on the squirrel at 150 mm.
+//! Benchmarks of single stages and of the whole job, on the squirrel at 150 mm.
 
 mod made;
 
@@ -93,7 +93,7 @@ fn whole_job(bencher: Bencher) {
     });
 }
 
-/// The kit that the stages from the wall on are measured with.
+/// Kit for the benchmarks of the stages from the wall on.
 fn kit() -> &'static Made {
     static KIT: OnceLock<Made> = OnceLock::new();
     KIT.get_or_init(|| Made::new(squirrel(), surface()))

@@ -1,4 +1,4 @@
-//! A mesh in, pieces out: `cargo run --release -p shellock --example design MODEL.stl [FOLDER]`.
+//! Makes pieces from a mesh: `cargo run --release -p shellock --example design MODEL.stl [FOLDER]`.
 
 use std::{env, error, fs};
 

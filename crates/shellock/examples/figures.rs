@@ -1,4 +1,5 @@
-//! Draws every figure from the front and the back into `figures.png`, or into the file named first.
+//! Draws every figure from the front and the back into `figures.png`, or into the file given as first
+//! argument.
 
 use std::time::Instant;
 

@@ -1,5 +1,5 @@
-//! Writes `report.html` and `pieces.png` of a squirrel in made-up pieces into the folder named first: to look
-//! at the report without running the pipeline. The pieces are bits of surface, not solids.
+//! Writes `report.html` and `pieces.png` of a squirrel in made-up pieces into the folder given as first
+//! argument. Shows the report without running the pipeline. The pieces are parts of the surface, not solids.
 
 use std::path::PathBuf;
 
@@ -65,7 +65,8 @@ fn main() -> std::io::Result<()> {
     std::fs::write(folder.join("report.html"), html(&data))
 }
 
-/// All pieces but the first, each a bit along its way and turned a little.
+/// Motion of all pieces but the first. Each moves slightly to and fro along its installation direction, and
+/// turns slightly.
 fn shake(pieces: &[ReportPiece<'_>]) -> ReportMotion {
     let sway = |piece: &ReportPiece<'_>, sign: f64| {
         let [x, y, z] = piece.installation_direction.map(|d| 0.2 * sign * d);
@@ -84,7 +85,7 @@ fn shake(pieces: &[ReportPiece<'_>]) -> ReportMotion {
     }
 }
 
-/// The last piece back along the way it came.
+/// Motion of the last piece out of the assembly, against its installation direction.
 fn take_out(pieces: &[ReportPiece<'_>]) -> ReportMotion {
     let last = pieces.len() - 1;
     let [x, y, z] = pieces[last].installation_direction.map(|d| -60.0 * d);
@@ -109,7 +110,7 @@ fn middle(piece: &ReportPiece<'_>) -> [f64; 3] {
     piece.mesh.bounds().center().to_array()
 }
 
-/// Parts of the surface by the nearest of some points.
+/// Parts of the surface, each nearest to one of several points.
 fn cut(model: &TriMesh) -> Vec<TriMesh> {
     let bounds = model.bounds();
     let shares = [

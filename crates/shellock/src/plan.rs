@@ -1,12 +1,12 @@
-//! Which piece goes in when and along which direction (Sect. 6).
+//! Assembly order and separation direction of each piece (Sect. 6).
 //!
 //! [`survey`] measures the segmented surface once: who occludes whom along the 26 directions, how good a
-//! connector each seam could carry, how flat each piece is. [`search`] then finds the plan and proves how
-//! good any other could be, again and again where later stages object. What a piece costs is one trait,
-//! [`PieceCosts`].
+//! connector each seam could carry, and how flat each piece is. [`search`] then finds a plan and proves how
+//! good any other plan could be. It runs again each time a later stage objects. The cost of a piece is one
+//! trait, [`PieceCosts`].
 //!
-//! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to
-//! simulation; seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
+//! Deviations from the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to
+//! simulation; seams too short for a connector join nothing; and the key is only chosen here, never cut anew.
 
 #[cfg(test)]
 mod bound_tests;

@@ -1,9 +1,9 @@
-//! From a closed surface to patches: where the shell is cut (Sect. 4).
+//! Division of a closed surface into patches, along which the shell is cut (Sect. 4).
 //!
-//! Labels come from the user or from clustering; they are refined until every patch is a disk and no single
-//! piece holds others alone; then the seams are smoothed and the triangles cut along them. Deviation from the
-//! paper, which takes the labels as given: without refining most labelled models have no plan that locks (see
-//! [`crate::seam::graph`]).
+//! Labels come from the user or from clustering. They are refined until every patch is a disk and no single
+//! piece is the only link to others. Then the seams are smoothed and the triangles cut along them. Deviation
+//! from the paper, which takes the labels as given: without refining, most labelled models have no plan that
+//! locks (see [`crate::seam::graph`]).
 
 mod changes;
 mod creases;
@@ -47,42 +47,44 @@ use refine::{Ground, refine_on};
 
 use crate::{Ctx, PatchId, SegmentedSurface};
 
-/// As many pieces as can be planned.
+/// Greatest number of pieces, as many as can be planned.
 pub const MOST_PIECES: usize = 128;
 
-/// How the surface is divided. Lengths in mm.
+/// Parameters of the division of a surface. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// How patches are found where there are no labels; where people would divide ([`Method::Auto`]).
+    /// Method that finds patches if there are no labels; [`Method::Auto`], which cuts where people would.
     pub method: Method,
-    /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: what
-    /// the method finds, and in creases from the area, 10 for a 150 mm figure.
+    /// Number of patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]];
+    /// `None`. With `None`, the method decides; in creases, the area does: 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
-    /// Regions that no seam is to divide; none.
+    /// Regions that no seam may divide; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry alike; no.
+    /// True if [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry
+    /// alike; false.
     pub symmetric: bool,
     /// Seed of all random choices; 0.
     pub seed: u64,
-    /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm,
-    /// about a connector.
+    /// Diffusion that smooths the seams, mm². [0, 100]; 7. It rounds off features narrower than its root, 2.6
+    /// mm, about a connector.
     pub smoothing_mm2: f64,
-    /// Shortest single seam stretch that counts as a contact. [0, 100]; 9: 3.5 connectors of 2.5 mm, as a run
-    /// loses 1.5 at each end.
+    /// Shortest single seam stretch that counts as a contact. [0, 100]; 9: 3.5 connectors of 2.5 mm, since a
+    /// run loses 1.5 of them at each end.
     pub min_contact_mm: f64,
-    /// Shortest such stretch where longer ones would take too many pieces. [0, [`min_contact_mm`]]; 9.
+    /// Shortest such stretch if longer ones would require too many pieces. [0, [`min_contact_mm`]]; 9.
     ///
     /// [`min_contact_mm`]: Self::min_contact_mm
     pub least_contact_mm: f64,
-    /// Depth at which those stretches are measured, where connectors are. [0, 10]; 0, the outer surface.
+    /// Depth at which those stretches are measured, where connectors lie. [0, 10]; 0, the outer surface.
     pub wall_mm: f64,
     /// Smallest patch, mm². [1, 10 000]; 60: a smaller piece has no room for connectors on two sides. Smaller
-    /// ones are merged.
+    /// patches are merged.
     pub min_piece_mm2: f64,
-    /// Edges longer than this are halved before patches are drawn. [0.5, 100]; 5: a tenth of a patch's width.
+    /// Longest edge before patches are drawn; longer ones are halved. [0.5, 100]; 5: a tenth of a patch's
+    /// width.
     pub max_edge_mm: f64,
-    /// Most pieces that refining may add. [0, 500]; 40.
+    /// Greatest number of pieces that refining may add. [0, 500]; 40.
     pub max_splits: usize,
 }
 
@@ -106,7 +108,7 @@ impl Default for SegmentationParams {
 }
 
 impl SegmentationParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns every problem at once, as messages for people; empty if there is none.
     pub fn problems(&self) -> Vec<String> {
         let mut found = Vec::new();
         if self.n_pieces.is_some_and(|n| !(2..=MOST_PIECES).contains(&n)) {
@@ -146,7 +148,8 @@ pub struct FaceLabels {
 }
 
 impl FaceLabels {
-    /// Patches are the connected sets of equal `label`, numbered by label, then by their lowest triangle.
+    /// Makes each connected set of equal `label` a patch. Patches are numbered by label, then by their lowest
+    /// triangle.
     pub(crate) fn from_connected(topology: &Topology, label: &[u32]) -> Self {
         let (component, n_patches) = components(topology, |f, g| label[f as usize] == label[g as usize]);
         let mut order: Vec<(u32, u32)> = vec![(u32::MAX, 0); n_patches];
@@ -164,17 +167,17 @@ impl FaceLabels {
         }
     }
 
-    /// The patch of triangle `face`.
+    /// Patch that contains triangle `face`.
     pub fn patch(&self, face: usize) -> PatchId {
         PatchId(self.patch_of_face[face])
     }
 
-    /// The patch number of each triangle, in order.
+    /// Patch number of each triangle, in order.
     pub fn as_slice(&self) -> &[u32] {
         &self.patch_of_face
     }
 
-    /// How many patches there are.
+    /// Number of patches in all.
     pub fn n_patches(&self) -> usize {
         self.n_patches
     }
@@ -191,22 +194,23 @@ impl FaceLabels {
     }
 }
 
-/// Limits that contacts are held against in turn, from `min_contact_mm` down to `least_contact_mm`.
+/// Number of limits on contacts that are tried in turn, from `min_contact_mm` down to `least_contact_mm`.
 const N_CONTACT_LIMITS: usize = 3;
 
-/// What is paid for a fault of the graph, for a label that lost its piece to another, and for each step to
+/// Prices of a fault of the contact graph, of a label that lost its piece to another, and of each step to
 /// shorter contacts, in pieces that refining may add instead. A kit with a fault does not lock; the other two
 /// are a matter of taste.
 const FAULT_COST: f64 = 100.0;
 const LOST_LABEL_COST: f64 = 8.0;
 const SHORTER_COST: f64 = 2.0;
-/// A drawn division that keeps regions whole has at least the pieces wanted over this many.
+/// Divisor of the wanted number of pieces. It gives the least number for a drawn division that keeps regions
+/// whole.
 const FEWEST_SHARE: usize = 2;
-/// What is paid where all of a drawn division is another, in pieces beyond what is welcome.
+/// Price of a drawn division that was replaced entirely, in pieces beyond the welcome number.
 const DISAGREEMENT_COST: f64 = 30.0;
 
-/// The whole stage: labels (the user's, or automatic ones), refined, smoothed and cut; `source_face` names
-/// triangles of `solid`.
+/// Runs the whole stage: takes the user's labels or automatic ones, refines, smooths and cuts. `source_face`
+/// of the result refers to triangles of `solid`.
 ///
 /// Warns as [`tell`] does.
 pub fn segment(
@@ -251,13 +255,13 @@ pub fn segment(
     Ok(surface)
 }
 
-/// Clusterings until one is easily mended; the one that cost least.
+/// Tries clusterings with different seeds until one is cheap to repair. Returns the cheapest.
 fn clustered(
     ctx: &Ctx,
     params: &SegmentationParams,
     ground: &Ground<'_>,
 ) -> Result<SegmentedSurface, SegmentationError> {
-    /// How often it is worth trying with another seed.
+    /// Greatest number of seeds worth trying.
     const CLUSTERINGS: u64 = 4;
     let mut best: Option<(f64, SegmentedSurface)> = None;
     for attempt in 0..CLUSTERINGS {
@@ -277,8 +281,8 @@ fn clustered(
     Ok(best.expect("there is at least one try").1)
 }
 
-/// The division by the method of `params`, or one with fewer parts where too many pieces would come of it; that
-/// which cost least.
+/// Divides by the method of `params`. If that leads to too many pieces, tries divisions with fewer parts as
+/// well. Returns the cheapest.
 fn proposed(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -310,17 +314,17 @@ fn proposed(
     Ok(drawn)
 }
 
-/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the
-/// number of pieces asked for.
+/// Origin of the patches that are changed. A user wants to recognise the labels; an automatic choice should
+/// have the number of pieces requested.
 #[derive(Clone, Copy, Debug)]
 enum LabelOrigin<'a> {
     User,
     Automatic,
-    /// By a method that cuts where people would; few enough pieces are to come of it.
+    /// Drawn by a method that cuts where people would; the result should have few enough pieces.
     Drawn {
         labels: &'a FaceLabels,
         wanted: usize,
-        /// Which triangle is whose mirror image, where both sides are to be divided alike.
+        /// Mirror image of each triangle, if both sides are to be divided alike.
         mirrored: Option<&'a Mirrored>,
     },
 }
@@ -333,11 +337,11 @@ impl LabelOrigin<'_> {
         }
     }
 
-    /// What the changes from `labels` to `surface` cost, in pieces.
+    /// Cost of the changes from `labels` to `surface`, in pieces.
     fn cost(self, labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
         let (before, after) = (labels.n_patches() as f64, surface.n_patches as f64);
         match self {
-            // Fewer pieces are larger than what was asked for, and not only more work.
+            // Fewer pieces are worse than more: they are larger than requested.
             Self::Automatic => (after - before).max(2.0 * (before - after)),
             Self::User => {
                 let n_lost = Changes::between(labels, surface).n_lost() as f64;
@@ -349,8 +353,8 @@ impl LabelOrigin<'_> {
         }
     }
 
-    /// What the changes from `labels` to `mended` cost at least, before seams are smooth: [`Self::cost`] without
-    /// labels that lose their piece.
+    /// Lower bound on the cost of the changes from `labels` to `mended`, before seams are smoothed:
+    /// [`Self::cost`] without labels that lose their piece.
     fn least_cost(self, labels: &FaceLabels, mended: &FaceLabels) -> f64 {
         let (before, after) = (labels.n_patches() as f64, mended.n_patches() as f64);
         match self {
@@ -360,7 +364,7 @@ impl LabelOrigin<'_> {
         }
     }
 
-    /// A cost with which nothing else is tried, for `n` patches in the beginning.
+    /// Cost at which no further division is tried, given `n` patches in the beginning.
     fn good_cost(self, n: usize) -> f64 {
         match self {
             Self::Automatic => 2.0 + 0.25 * n as f64,
@@ -370,14 +374,14 @@ impl LabelOrigin<'_> {
     }
 }
 
-/// Pieces beyond what is welcome where `wanted` are.
+/// Number of pieces beyond the welcome number if `wanted` are wanted.
 fn excess(n: usize, wanted: usize) -> f64 {
-    /// As many more, as a share, do no harm.
+    /// Multiple of the wanted number that is still welcome.
     const WELCOME: f64 = 1.2;
     (n as f64 - WELCOME * wanted as f64).max(0.0)
 }
 
-/// The limits that contacts are held against in turn, mm.
+/// Limits on contacts that are tried in turn, mm.
 fn contact_limits(params: &SegmentationParams) -> Vec<f64> {
     let (most, least) = (
         params.min_contact_mm,
@@ -389,8 +393,7 @@ fn contact_limits(params: &SegmentationParams) -> Vec<f64> {
     limits
 }
 
-/// The limit that the contacts of `surface` keep, mm: the longest with which the fewest pieces hold others
-/// alone.
+/// Limit that the contacts of `surface` satisfy, mm: the longest with the fewest faults of the contact graph.
 fn kept_limit_mm(params: &SegmentationParams, surface: &SegmentedSurface) -> f64 {
     let faults = |limit_mm: &f64| surface.contact_graph_below(params.wall_mm, *limit_mm).n_faults();
     contact_limits(params)
@@ -399,8 +402,8 @@ fn kept_limit_mm(params: &SegmentationParams, surface: &SegmentedSurface) -> f64
         .expect("there is at least one limit")
 }
 
-/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface that
-/// costs less than `limit`, and its cost.
+/// Repairs `labels` for long contacts, and for shorter ones if those cost too much. Returns the cheapest
+/// surface that costs less than `limit`, with its cost.
 fn best_contacts(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -434,11 +437,10 @@ fn best_contacts(
     Ok(best)
 }
 
-/// The same surface with `patch` divided in two, refined and smoothed again; `None` where it cannot be
-/// divided.
+/// Divides `patch` of the surface in two, then refines and smooths again. `None` if it cannot be divided.
 ///
-/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered.
-/// Fails where the user stopped, or the seams cannot be smoothed.
+/// The feedback loop uses this if no plan takes the piece out or holds it. Patches may be renumbered. Fails
+/// if the user stopped, or if the seams cannot be smoothed.
 pub fn divide(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -454,7 +456,7 @@ pub fn divide(
     })
 }
 
-/// The same surface refined and smoothed again, as its patches are; `None` where a patch would vanish. Patches
+/// Refines and smooths the surface again with its present patches. `None` if a patch would vanish. Patches
 /// may be renumbered.
 pub fn refined_again(
     ctx: &Ctx,
@@ -464,10 +466,10 @@ pub fn refined_again(
     changed(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
-/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, refined and
-/// smoothed again; `None` where there would be too few pieces left to lock, or nothing is joined.
+/// Joins each of `patches` to the neighbour with the longest common seam, then refines and smooths again.
+/// `None` if too few pieces would be left to lock, or if nothing is joined.
 ///
-/// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
+/// The feedback loop uses this if dividing did not help. Patches may be renumbered.
 pub fn unite(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -492,7 +494,8 @@ pub fn unite(
     })
 }
 
-/// Another segmentation with two pieces that touch made one; `None` where that leaves nothing to lock.
+/// Joins two pieces that touch, then refines and smooths again. `None` if too few pieces would be left to
+/// lock.
 pub fn unite_two(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -510,7 +513,8 @@ pub fn unite_two(
     })
 }
 
-/// What has fewer patches than `surface` and still enough: of two pieces each leaves the other.
+/// Returns `joined` if it has fewer patches than `surface` and still at least three: of two pieces, each can
+/// leave the other.
 fn enough_left(joined: FaceLabels, surface: &SegmentedSurface) -> Option<FaceLabels> {
     const FEWEST: usize = 3;
     (FEWEST..surface.n_patches)
@@ -518,7 +522,7 @@ fn enough_left(joined: FaceLabels, surface: &SegmentedSurface) -> Option<FaceLab
         .then_some(joined)
 }
 
-/// Whether some of the contacts that hold `surface` together are shorter than wanted.
+/// Returns true if some of the contacts that hold `surface` together are shorter than wanted.
 pub fn has_short_contacts(params: &SegmentationParams, surface: &SegmentedSurface) -> bool {
     kept_limit_mm(params, surface) < params.min_contact_mm
 }
@@ -544,7 +548,7 @@ fn changed(
     let ground = Ground::keeping(params, &solid, &surface.source_face);
     let refined = refine_on(ctx, &limited, &ground, &changed)?;
     let mut next = match smooth_and_cut(ctx, params, &solid, &refined) {
-        // Other pieces may do.
+        // Another choice of pieces may succeed.
         Err(SegmentationError::PatchVanished { .. }) => return Ok(None),
         made => made?,
     };

@@ -1,4 +1,4 @@
-//! What holds of finished pieces, on an egg in eight.
+//! Properties of finished pieces, for an egg in eight pieces.
 
 #[expect(dead_code, reason = "benches read more of it")]
 #[path = "../benches/made/mod.rs"]
@@ -24,7 +24,7 @@ fn egg() -> &'static Solid {
     &EGG
 }
 
-/// Its eight octants as pieces.
+/// Pieces made of the egg's eight octants.
 fn kit() -> &'static Made {
     static KIT: LazyLock<Made> = LazyLock::new(|| {
         let octant = |f: usize| {
@@ -39,10 +39,11 @@ fn kit() -> &'static Made {
     &KIT
 }
 
-/// Triangles whose centre is so near to the model's surface are skin, mm; coordinates of 32 bits round by less.
+/// Greatest distance of a triangle's centre from the model's surface for it to count as skin, mm. The
+/// rounding of 32-bit coordinates is smaller.
 const SKIN_MM: f64 = 1e-4;
 
-/// So many cells of the grid a piece's skin may reach over the border of its patch.
+/// Greatest reach of a piece's skin over the border of its patch, in cells of the grid.
 const CELLS_ACROSS: f64 = 2.0;
 
 #[test]
@@ -105,8 +106,8 @@ fn every_outer_triangle_lies_on_its_own_patch_of_the_model_and_together_they_are
     );
 }
 
-/// Runs may be shorter than plans expect by this share and so many mm: where three seams meet, the inner edge
-/// starts elsewhere than the outer one.
+/// Greatest shortfall of a run compared with its plan, as a share and in mm. At points where three seams
+/// meet, the inner edge starts elsewhere than the outer one.
 const SHORTER_SHARE: f64 = 0.15;
 const SHORTER_MM: f64 = 2.0;
 

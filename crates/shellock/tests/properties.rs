@@ -1,5 +1,5 @@
-//! What does not depend on how a model lies or how its pieces are numbered: its division, and what planning
-//! measures of it and charges for plans. And what a turn of the model is.
+//! Results that must not depend on the pose of a model or the numbers of its pieces: its division, and the
+//! measurements and costs of planning. Also tests turns of the model.
 
 use std::sync::LazyLock;
 
@@ -13,15 +13,15 @@ use shellock_geom::{Solid, Topology, Vec3};
 use shellock_testkit::property::{LatticeTurn, cases, orders, turns, vectors};
 use shellock_testkit::shapes::sphere;
 
-/// Patches of the pebble as they are labelled.
+/// Number of labels of the pebble.
 const N: usize = 7;
 
-/// An egg with three different axes, so that nothing is decided by a tie.
+/// An egg with three different axes, so that no tie decides anything.
 fn pebble() -> Solid {
     Solid::new(sphere(4, Vec3::new(41.0, 34.0, 29.0))).unwrap()
 }
 
-/// For each triangle the nearest of [`N`] directions, spread unevenly.
+/// For each triangle, the nearest of [`N`] unevenly spread directions.
 fn labels() -> Vec<usize> {
     let solid = pebble();
     let site = |i: usize| {
@@ -35,7 +35,7 @@ fn labels() -> Vec<usize> {
     (0..solid.mesh().triangles.len()).filter_map(nearest).collect()
 }
 
-/// The pebble turned, shifted and divided along its labels, which have these names.
+/// The pebble turned, shifted and divided along its labels, renamed to `names`.
 fn divided(turn: &LatticeTurn, shift: Vec3, names: &[usize]) -> SegmentedSurface {
     let solid = Solid::new(turn.mesh(pebble().mesh(), shift)).unwrap();
     let named: Vec<i64> = labels().iter().map(|&l| names[l] as i64).collect();
@@ -71,7 +71,7 @@ fn survey_as_given() -> &'static PlanSurvey {
     &GIVEN
 }
 
-/// The same surface with the `i`-th piece called `number[i]`.
+/// Renames the `i`-th piece of the surface to `number[i]`.
 fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface {
     let new = |&p: &PatchId| PatchId::from(number[usize::from(p)]);
     SegmentedSurface {
@@ -80,8 +80,8 @@ fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface 
     }
 }
 
-/// Asserts that `other` has the contacts and the flat pieces of the pebble as it was given, where piece `i` is
-/// called `number[i]` and all directions are turned.
+/// Asserts that `other` has the contacts, areas and mean normals of the original pebble, with piece `i`
+/// renamed to `number[i]` and all directions turned.
 fn assert_same_contacts(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize], tolerance: f64) {
     let given = survey_as_given();
     assert_eq!(other.contacts.len(), given.contacts.len());
@@ -113,7 +113,7 @@ fn assert_same_contacts(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]
     }
 }
 
-/// How much shares of what is in whose way differ at most.
+/// Greatest difference between the occlusion shares of the original and the turned pebble.
 fn farthest_share(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]) -> f64 {
     let given = survey_as_given();
     let new = |p: usize| PatchId::from(number[p]);
@@ -131,7 +131,7 @@ fn farthest_share(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]) -> f
     farthest
 }
 
-/// Patches that are connected, part a closed surface and hold each other twice.
+/// Asserts that patches are connected, divide a closed surface and have a 2-connected contact graph.
 fn assert_valid(surface: &SegmentedSurface, volume_mm3: f64) {
     let cut = Solid::new(surface.mesh.clone()).unwrap();
     assert!((cut.volume() / volume_mm3 - 1.0).abs() < 1e-9);
@@ -179,7 +179,7 @@ proptest! {
         let survey = surveyed(&turned);
         let same = Vec::from_iter(0..N);
         assert_same_contacts(&survey, &turn, &same, 1e-6);
-        // Pictures have pixels, and turn only nearly with what they show.
+        // Pictures have pixels, so they turn only approximately with the model.
         let farthest = farthest_share(&survey, &turn, &same);
         prop_assert!(farthest < 0.01, "{}", farthest);
     }

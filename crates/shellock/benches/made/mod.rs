@@ -1,5 +1,5 @@
-//! A kit made stage by stage, as the whole job makes one where a piece is the key: for benches of single
-//! stages and for tests of what comes out.
+//! Makes a kit stage by stage, as the whole job does if a piece is the key. Used by benchmarks of single
+//! stages and tests of the result.
 
 use shellock::body::{PatchDistances, ShellBodies, ShellGrid};
 use shellock::connector::{self, Run, is_unobstructed};
@@ -12,14 +12,14 @@ use shellock::{
 };
 use shellock_geom::{Aabb, Solid};
 
-/// A kit and all that it was made from.
+/// A kit with all the data from which it was made.
 pub struct Made {
     pub settings: Settings,
     pub sizes: ConnectorSizes,
     pub surface: SegmentedSurface,
-    /// As it was found.
+    /// Plan as the search found it.
     pub found: LatticePlan,
-    /// The same, to be judged.
+    /// Plan in the form that the verification takes.
     pub plan: InstallationPlan,
     pub grid: ShellGrid,
     pub distances: PatchDistances,
@@ -29,7 +29,7 @@ pub struct Made {
 }
 
 impl Made {
-    /// The first plan of `surface`, made into pieces.
+    /// Makes pieces by the first plan of `surface`.
     pub fn new(model: &Solid, surface: SegmentedSurface) -> Self {
         let ctx = &Ctx::quiet();
         let settings = Settings::resolve(&Params::default());
@@ -63,7 +63,7 @@ impl Made {
         }
     }
 
-    /// The pieces, to be judged.
+    /// Assembly of the pieces, for the verification.
     pub fn assembly<'a>(&'a self, model: &'a Solid) -> Assembly<'a> {
         Assembly {
             model: Some(model),
@@ -74,7 +74,7 @@ impl Made {
     }
 }
 
-/// Where each piece's body may be: around its patch.
+/// Bounding box of each piece's body, around its patch.
 fn rooms(settings: &Settings, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> IdVec<PatchId, Aabb> {
     let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
     for (face, &p) in surface.patch_of_face.iter().enumerate() {
@@ -84,7 +84,7 @@ fn rooms(settings: &Settings, surface: &SegmentedSurface, sizes: &ConnectorSizes
     rooms.as_slice().iter().map(|r| r.grown(reach_mm)).collect()
 }
 
-/// The wall, split along the plan.
+/// Splits the wall along the plan.
 pub fn split(
     settings: &Settings,
     surface: &SegmentedSurface,
@@ -97,7 +97,7 @@ pub fn split(
     body::build(&Ctx::quiet(), &settings.body, grid, distances, plan, &rooms).expect("pieces leave freely")
 }
 
-/// Connectors under its seams.
+/// Connectors under the plan's seams.
 pub fn runs(
     settings: &Settings,
     sizes: &ConnectorSizes,
@@ -111,7 +111,7 @@ pub fn runs(
     connector::runs(&settings.connector, sizes, plan, &curves, None, &is_free).0
 }
 
-/// Pieces, carved and joined, with numbers.
+/// Carves and joins the pieces, and engraves their numbers.
 pub fn finish(
     settings: &Settings,
     surface: &SegmentedSurface,

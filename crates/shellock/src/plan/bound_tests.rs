@@ -1,4 +1,5 @@
-//! The proof against brute force on many small cases, with any work: a bound may be low, never wrong.
+//! Tests the proof against brute force on many small cases, with any amount of work: a bound may be low,
+//! never wrong.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +13,7 @@ use super::space::Space;
 use super::*;
 use crate::{LatticeDirection, PatchId};
 
-/// Costs as Eq. 6 has them: the maximum over pairs of states at a piece's seams, out of a table.
+/// Costs as in Eq. 6: the maximum over pairs of states at a piece's seams, from a table.
 struct PairCosts {
     by_piece: Vec<Vec<f64>>,
 }
@@ -30,7 +31,7 @@ impl PairCosts {
     }
 }
 
-/// What a seam can be for a piece in `role`, as numbers.
+/// Possible states of a seam for a piece in `role`, as numbers.
 fn states(role: Role, seam: SeamStates) -> Vec<usize> {
     let own = role
         .separation()
@@ -60,7 +61,8 @@ impl PieceCosts for PairCosts {
     }
 }
 
-/// A survey with ties, seams of all lengths, pieces a little in each other's way, and well or badly held.
+/// A random survey with ties, seams of all lengths, pieces slightly in each other's way, and well or badly
+/// held.
 fn thrown(n: usize, rng: &mut ChaCha8Rng) -> PlanSurvey {
     let all = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b)));
     let edges: Vec<(u32, u32)> = all.filter(|_| rng.random_range(0.0..1.0) < 0.95).collect();
@@ -114,7 +116,7 @@ fn lessons(n: usize, rng: &mut ChaCha8Rng) -> PlanConstraints {
 /// Costs of three kinds, in units from 10⁻⁹ to 10⁹.
 fn costs(survey: &PlanSurvey, constraints: &PlanConstraints, rng: &mut ChaCha8Rng) -> Box<dyn PieceCosts> {
     let n_levels = rng.random_range(2..6);
-    // Pairs take long where neighbours are many.
+    // Pairs take long if there are many neighbours.
     match rng.random_range(0..if survey.n_pieces > 3 { 4 } else { 6 }) {
         0..=2 => Box::new(SeamCosts::new(survey, constraints)),
         3 => Box::new(BoundsAlone(SeamCosts::new(survey, constraints))),
@@ -127,7 +129,7 @@ fn costs(survey: &PlanSurvey, constraints: &PlanConstraints, rng: &mut ChaCha8Rn
     }
 }
 
-/// Work allowed in all, and for the first questions by piece: small questions are what leaves answers open.
+/// Work allowed in all, and for the first questions per piece. Small questions are the ones that stay open.
 const WORK: [(usize, usize); 7] = [
     (1, 60),
     (10, 1),
@@ -161,7 +163,7 @@ fn whatever_the_work_the_bound_is_at_most_the_optimum_and_the_plan_costs_at_leas
         for (n_left, first_per_piece) in WORK {
             let mut candidates: Vec<Candidate<'_>> = keys.iter().map(|k| Candidate::new(k, n)).collect();
             if round % 3 > 0 {
-                // As in the search, some plan is known.
+                // Some plan is known, as in the search.
                 let limits = DrawLimits {
                     bound: f64::INFINITY,
                     max_tries: 20 * n,
@@ -217,6 +219,7 @@ fn whatever_the_work_the_bound_is_at_most_the_optimum_and_the_plan_costs_at_leas
     );
 }
 
-/// About half a second. Rounds 5 and 10 are the first to fail where a proof takes an open question of a
-/// bisection for an answer, and where narrowing strikes out what costs more than nine tenths of the limit.
+/// Number of rounds, which take about half a second. Rounds 5 and 10 are the first to fail for two faults: a
+/// proof that takes an open question of a bisection for an answer, and narrowing that removes what costs more
+/// than nine tenths of the limit.
 const N_ROUNDS: usize = 16;

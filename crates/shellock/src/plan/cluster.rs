@@ -1,48 +1,47 @@
-//! Does a plan lock? The cluster test: exact for ideal joints and translations, in microseconds.
+//! The cluster test of whether a plan locks: exact for ideal joints and translations, in microseconds.
 //!
-//! A joint between a later piece p and an earlier q lets p leave along `s_p`, and nothing else. So if a set
-//! of pieces moves along `d`, then along with x must move every y that x pushes or pulls: both ways for a
-//! joint across `d`, only "q takes p along" where `d = s_p`, only "p takes q along" where `d = −s_p`, and
-//! both ways for the key, which is held. The assembly locks exactly when for every `d` this digraph is
-//! strongly connected: then nothing can move without everything.
+//! A joint between a later piece p and an earlier q lets p leave along `s_p` and blocks all other motions. So
+//! if a set of pieces moves along `d` and contains x, it must contain every y that x pushes or pulls. A joint
+//! along neither of ±`d` acts both ways. If `d = s_p`, only q takes p along; if `d = −s_p`, only p takes q
+//! along. Joints of the key act both ways, since the key is held. The assembly locks exactly if this digraph
+//! is strongly connected for every `d`: then nothing can move without everything.
 //!
-//! Reversing `d` reverses every arc, so one of ±d is enough. Along a `d` that is no piece's direction all
+//! Reversing `d` reverses every arc, so one of ±d is enough. Along a `d` that is no piece's direction, all
 //! joints hold both ways, and the graph is connected if it is along any other.
-//!
-//! Limits: rotations, play and elasticity are left to later tests.
 
 use super::PieceSet;
 use crate::{LatticeDirection, PatchId};
 
-/// A connector between two pieces that holds.
+/// A connector that holds between two pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DirectedJoint {
     /// The piece installed later.
     pub later: PatchId,
     /// The piece installed earlier.
     pub earlier: PatchId,
-    /// The direction along which `later` leaves.
+    /// Direction along which `later` leaves.
     pub separation: LatticeDirection,
 }
 
-/// Pieces that can move together while the key and all others rest.
+/// Pieces that can move together while the key and all others stay in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoosePart {
-    /// What moves; neither empty nor with the key in it.
+    /// Set of pieces that move; never empty, and never contains the key.
     pub pieces: PieceSet,
-    /// Whereto.
+    /// Direction in which they move.
     pub direction: LatticeDirection,
 }
 
-/// A part that comes loose with the key held; `None` where the plan locks. `n_pieces` ≤
+/// Finds a part that comes loose while the key is held; `None` if the plan locks. `n_pieces` ≤
 /// [`PieceSet::MAX_PIECES`].
 pub fn loose_part(n_pieces: usize, joints: &[DirectedJoint], key: PatchId) -> Option<LoosePart> {
     loose_part_fused(n_pieces, joints, key, PieceSet::EMPTY)
 }
 
-/// As [`loose_part`], with the pieces of `fused` moving as one.
+/// Runs the test of [`loose_part`] with the pieces of `fused` moving as one.
 ///
-/// What is loose so is loose whatever joints the fused pieces get later, so a search may stop there.
+/// A part that is loose here stays loose whatever joints the fused pieces get later, so a search may stop
+/// there.
 pub(super) fn loose_part_fused(
     n_pieces: usize,
     joints: &[DirectedJoint],
@@ -66,7 +65,7 @@ pub(super) fn loose_part_fused(
     let mut directions: Vec<LatticeDirection> = LatticeDirection::all().take(lines.len()).collect();
     directions.retain(|d| lines[d.index()]);
     if directions.is_empty() {
-        // Only the key leaves: any direction tells whether everything hangs together.
+        // Only the key leaves, so any direction shows if the pieces are connected.
         directions.extend(LatticeDirection::all().next());
     }
     directions
@@ -74,7 +73,7 @@ pub(super) fn loose_part_fused(
         .find_map(|d| loose_along(d, joints, key, &both_ways[..n_pieces], all))
 }
 
-/// The one of ±d with the lower index.
+/// Representative of ±d: the direction with the lower index.
 fn line_of(d: LatticeDirection) -> LatticeDirection {
     d.min(d.opposite())
 }
@@ -86,7 +85,7 @@ fn loose_along(
     both_ways: &[PieceSet],
     all: PieceSet,
 ) -> Option<LoosePart> {
-    // `pulls[x]` moves along with x; `pulled_by[x]` takes x along.
+    // `pulls[x]` are the pieces that x takes along; `pulled_by[x]` are those that take x along.
     let mut pulls = [PieceSet::EMPTY; PieceSet::MAX_PIECES];
     let mut pulled_by = pulls;
     pulls[..both_ways.len()].copy_from_slice(both_ways);
@@ -107,7 +106,7 @@ fn loose_along(
             direction: d,
         });
     }
-    // Where the key's own cluster leaves along d, the others leave it along −d.
+    // If the key's own cluster can leave along d, the others can leave it along −d.
     let left_behind = all.minus(PieceSet::reached_from(key, &pulls));
     (!left_behind.is_empty()).then_some(LoosePart {
         pieces: left_behind,
@@ -122,7 +121,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether `pieces` may all move along `d` while the rest rests.
+    /// Returns true if all of `pieces` may move along `d` while the others stay in place.
     fn moves(pieces: u32, d: LatticeDirection, joints: &[DirectedJoint], key: PatchId) -> bool {
         joints.iter().all(|j| {
             let (p, q) = (pieces >> j.later.0 & 1 == 1, pieces >> j.earlier.0 & 1 == 1);
@@ -167,7 +166,7 @@ mod tests {
         for round in 0..2000 {
             let n = 2 + round % 5;
             let joints = random_joints(n, &mut rng);
-            // Subsets without the key: with it, the others move the opposite way.
+            // Subsets without the key are enough: where the key moves, the others move the opposite way.
             let any_moves = (1..1_u32 << (n - 1))
                 .any(|others| LatticeDirection::all().any(|d| moves(others << 1, d, &joints, key)));
             match loose_part(n as usize, &joints, key) {

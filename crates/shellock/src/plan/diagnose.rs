@@ -1,10 +1,10 @@
-//! Why there is no plan.
+//! Diagnosis of why there is no plan.
 
 use super::space::Space;
 use super::{Blocker, PieceSet, PlanOutcome};
 use crate::{LatticeDirection, PatchId};
 
-/// No plan can be, whatever is tried: the contacts do not hang together well enough.
+/// Returns the reason if no plan can exist at all, because the contact graph is not connected well enough.
 pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     if !space.all().is_connected(&space.neighbours) {
         let alone: Vec<String> = (0..space.n)
@@ -41,7 +41,7 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     })
 }
 
-/// The search got no further than `stuck`.
+/// Explains a search that got no further than the pieces `stuck`.
 pub(super) fn stuck(space: &Space<'_>, stuck: PieceSet) -> PlanOutcome {
     let mut blockers = Vec::new();
     let mut n_free = 0;
@@ -57,7 +57,7 @@ pub(super) fn stuck(space: &Space<'_>, stuck: PieceSet) -> PlanOutcome {
             names.join(", ")
         )
     } else {
-        // Paths are not what stops these: what they leave behind falls apart or comes loose.
+        // Some path is free, so paths are not the reason: what remains is disconnected or comes loose.
         blockers.clear();
         format!(
             "paths are free, but no order and directions tried for pieces {} lock the assembly",
@@ -71,7 +71,8 @@ pub(super) fn stuck(space: &Space<'_>, stuck: PieceSet) -> PlanOutcome {
     }
 }
 
-/// Who is in the way of `piece` out of `rest` along the direction where the least of it is occluded.
+/// Blockers of `piece` among `rest`, along the direction in which it is occluded least; empty if it can
+/// leave.
 fn blockers_of(space: &Space<'_>, piece: PatchId, rest: PieceSet) -> Vec<Blocker> {
     let occlusion = &space.survey.occlusion;
     let worst = |s: LatticeDirection| {

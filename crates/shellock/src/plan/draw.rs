@@ -1,8 +1,8 @@
-//! One random plan, taken apart from the key on, with pruning and backtracking (Sect. 6.2).
+//! One random plan, built by disassembly from the key on, with pruning and backtracking (Sect. 6.2).
 //!
-//! Prunings come in the order of their cost: what is left hangs together, the path is free, the piece costs
-//! no more than the bound, and what was taken off does not come loose from the rest (the cluster test, which
-//! the paper does not have).
+//! The pruning tests run in order of their cost: the pieces left are connected; the path is free; the piece
+//! costs no more than the bound; and the removed pieces do not come loose from the rest (the cluster test,
+//! which the paper does not have).
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -15,30 +15,31 @@ use super::space::Space;
 use super::{LatticePlan, LatticeStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
 
-/// Spreads of the random order of candidates, in units of their cost; draws take turns.
+/// Spreads of the random order of candidates, in units of their cost. Draws cycle through them.
 ///
-/// A small spread is greedy, a large one uniform: the first finds good plans, the last finds plans at all.
+/// A small spread is greedy and finds good plans. A large spread is uniform and finds plans at all.
 const SPREADS: [f64; 4] = [0.05, 0.2, 0.6, 100.0];
 
-/// How a draw ended.
+/// Result of one draw.
 pub(super) struct Drawn {
     pub plan: Option<LatticePlan>,
-    /// Pieces taken off, put back ones included.
+    /// Number of removals, including those undone.
     pub n_tries: usize,
-    /// Costs of pieces asked for.
+    /// Number of piece costs evaluated.
     pub n_evaluations: usize,
-    /// Whether nothing was left to try: then no plan within the bound exists for this key.
+    /// True if nothing was left to try. Without a plan, this means that none within the bound exists for this
+    /// key.
     pub is_exhausted: bool,
-    /// The fewest pieces that were left where the search got stuck.
+    /// Smallest set of pieces at which the search got stuck.
     pub stuck: PieceSet,
 }
 
-/// What a draw may do.
+/// Limits of one draw.
 #[derive(Clone, Copy)]
 pub(super) struct DrawLimits {
-    /// Costs above this are pruned; infinite for none. It must not depend on what other threads find.
+    /// Greatest cost of a piece; infinite for no limit. Must not depend on results of other threads.
     pub bound: f64,
-    /// Pieces taken off before the draw is given up.
+    /// Removals after which the draw is abandoned.
     pub max_tries: usize,
 }
 
@@ -47,11 +48,11 @@ pub(super) struct DrawLimits {
 pub(super) struct Draws {
     /// Number of batches. Each draw of each batch has its own random stream.
     pub n_batches: usize,
-    /// Number of plans.
+    /// Number of plans drawn so far.
     pub n_plans: usize,
     /// Number of batches since the best plan was found.
     pub n_stale: usize,
-    /// True where a draw had nothing left to try.
+    /// True if a draw found no plan and had nothing left to try.
     pub is_exhausted: bool,
 }
 
@@ -64,7 +65,7 @@ struct Draw<'a> {
     tries_left: usize,
     n_evaluations: usize,
     removed: Vec<LatticeStep>,
-    /// Directions of the pieces taken off.
+    /// Directions of the removed pieces.
     separations: Vec<Option<LatticeDirection>>,
     joints: Vec<DirectedJoint>,
     stuck: PieceSet,
@@ -108,8 +109,8 @@ pub(super) fn draw(
 }
 
 impl Draw<'_> {
-    /// Takes off all of `left`; `attached` holds the pieces that a later one joins. False with everything put
-    /// back.
+    /// Removes all of `left`; `attached` holds the pieces that a later one joins. On failure, returns false
+    /// with all removals undone.
     fn descend(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         if left.len() == 1 {
             return self.finish(left, attached);
@@ -124,7 +125,7 @@ impl Draw<'_> {
             self.joints.extend(self.space.joints(piece, separation, rest));
             self.removed.push(LatticeStep { piece, separation });
             self.separations[usize::from(piece)] = Some(separation);
-            // What comes loose already, with the rest as one block, cannot lock any more.
+            // A part that is loose already, with the rest as one block, can never lock.
             let holds = loose_part_fused(self.space.n, &self.joints, self.key.piece, rest).is_none();
             let attached = attached.union(self.space.joined(piece, separation, rest));
             if holds && self.descend(rest, attached) {
@@ -140,7 +141,7 @@ impl Draw<'_> {
         false
     }
 
-    /// The first-installed piece: nothing is left that it could leave.
+    /// Adds the first-installed piece, which has no other piece to leave.
     fn finish(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         let piece = left.iter().next().expect("one piece is left");
         let separation = LatticeDirection::nearest(self.space.survey.mean_normal[piece]);
@@ -159,7 +160,7 @@ impl Draw<'_> {
         true
     }
 
-    /// What the piece of `step` costs when it leaves `rest`.
+    /// Cost of the piece of `step` as it leaves `rest`.
     fn cost(&mut self, step: LatticeStep, rest: PieceSet) -> f64 {
         self.n_evaluations += 1;
         let (role, around) = self.space.leaving(step, rest, &self.separations);
@@ -170,7 +171,7 @@ impl Draw<'_> {
         cost <= just_above(self.limits.bound)
     }
 
-    /// Who may leave `left` next and along which direction, in random order, good ones likely first.
+    /// Pieces that may leave `left` next, with their directions, in a random order that favours low costs.
     fn candidates(&mut self, left: PieceSet, attached: PieceSet) -> Vec<(PatchId, LatticeDirection)> {
         let mut candidates = Vec::new();
         let is_first = left == self.space.all();
@@ -190,7 +191,7 @@ impl Draw<'_> {
                 }
                 let cost = self.cost(step, rest);
                 if self.is_cheap(cost) {
-                    // Gumbel noise: the order is that of drawing without putting back, by weight exp(−cost /
+                    // Gumbel noise: the order is that of drawing without replacement, by weight exp(−cost /
                     // spread).
                     let u: f64 = self.rng.random_range(1e-12..1.0);
                     let noise = -(-u.ln()).ln();

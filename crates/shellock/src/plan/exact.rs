@@ -1,17 +1,18 @@
-//! The best plan with any of the given keys, and the proof: bisection on the cost of the worst piece.
+//! The best plan with any of the given keys, and its proof: bisection on the cost of the worst piece.
 //!
-//! Whether a plan exists whose pieces all cost at most T is a search of its own: [`domains`] strikes out what
-//! cannot be, the most disputed piece or seam that is still open is decided either way, and so on until all
-//! is decided, which [`sequence`] turns into an order. No answer within its budget leaves the question open;
-//! "none" is a proof, so T bounds all plans. Each key is asked on its own, with the best plan of all keys as
-//! the limit, and small questions before large ones, so that a key that is hard to prove keeps no other from
-//! being tried.
+//! The question is whether a plan exists whose pieces all cost at most T. It needs a search of its own.
+//! [`domains`] removes what is impossible. Then the piece or seam that is still open and caused most
+//! conflicts is decided either way. This repeats until all is decided, and [`sequence`] turns the decisions
+//! into an order. If the budget runs out, the question stays open. The answer "none" is a proof, so T bounds
+//! all plans. Each key is asked on its own, with the best plan of all keys as the limit. Small questions come
+//! before large ones, so that a key that is hard to prove does not block the others.
 //!
-//! Deviation: a depth-first search from the key backwards meets a contradiction between two far pieces only
-//! after every way to take off the others. Deciding disputed pieces first, in any place, meets it at once.
-//! The order is only kept as far as it must be, so orders that differ in pieces that do not touch are one.
+//! Deviation: a depth-first search from the key backwards meets a contradiction between two distant pieces
+//! only after it has tried every way to remove the others. Deciding pieces by conflicts, in any place, meets
+//! it at once. The order is kept only as far as necessary, so orders that differ in pieces that do not touch
+//! are one.
 //!
-//! Nothing here depends on threads or time but for the stop that [`Ctx::is_time_up`] asks for.
+//! The result does not depend on threads or time, except for the stop that [`Ctx::is_time_up`] requests.
 //!
 //! Sources: the weights of conflicts are those of Boussemart et al. 2004, *Boosting systematic search by
 //! weighting constraints*.
@@ -35,28 +36,28 @@ use crate::{Cancelled, Ctx, PatchId};
 use domains::{Conflict, Domains, Propagator};
 use sequence::{Sequence, sequence};
 
-/// Share of the cost between two thresholds below which bisection stops and more work is spent on one
-/// question.
+/// Relative step of cost between two thresholds, below which bisection stops and each question gets more
+/// work.
 const FINEST_STEP: f64 = 0.002;
 
-/// Pieces revised for one question at first, per piece; four times as many each time that all questions were
-/// left open.
+/// Initial limit on revisions for one question, per piece. It is multiplied by four each time that questions
+/// stay open.
 const FIRST_BUDGET_PER_PIECE: usize = 60;
 
-/// Decisions before the first restart, and by how much they grow: weights learned in one run steer the next.
+/// Decisions before the first restart, and growth of later runs. Weights learned in one run guide the next.
 const FIRST_RUN: usize = 50;
 const RUN_GROWTH: f64 = 1.4;
 
-/// Work that may still be done.
+/// Work limits of the exact search.
 pub(super) struct Budget {
-    /// Pieces that may still be revised.
+    /// Number of revisions of pieces that are left in all.
     pub n_left: usize,
-    /// Revisions for one question at first, per piece.
+    /// Initial limit on revisions for one question, per piece.
     pub first_per_piece: usize,
 }
 
 impl Budget {
-    /// At most `n` revisions.
+    /// Allows at most `n` revisions in all.
     pub fn new(n: usize) -> Self {
         Self {
             n_left: n,
@@ -65,28 +66,28 @@ impl Budget {
     }
 }
 
-/// The answer to "is there a plan whose pieces all cost at most this?".
+/// Answer to "is there a plan whose pieces all cost at most this?".
 enum Answer {
     Plan(LatticePlan),
     None,
     Unknown,
 }
 
-/// One way to choose the key, and what is known of the plans with it.
+/// One choice of the key, and what is known of the plans with it.
 pub(super) struct Candidate<'k> {
     pub key: &'k KeyChoice,
-    /// The best that were found.
+    /// Best plans found with this key.
     pub pool: Pool,
-    /// None costs less; infinite where there is none.
+    /// Lower bound on the cost of plans with this key; infinite if there is none.
     pub lower_bound: f64,
     /// State of the random draws.
     pub draws: Draws,
-    /// How often each piece was at fault: what one question teaches steers the next.
+    /// Weight of each piece, which grows by 1 with each conflict there. One question guides the next.
     weights: Vec<f64>,
 }
 
 impl<'k> Candidate<'k> {
-    /// Nothing is known of the plans with `key`, for `n` pieces.
+    /// Creates a candidate with `key` for `n` pieces, about whose plans nothing is known.
     pub fn new(key: &'k KeyChoice, n: usize) -> Self {
         Self {
             key,
@@ -105,7 +106,7 @@ impl<'k> Candidate<'k> {
     }
 }
 
-/// Cost of the best plan of all; infinite where none was found.
+/// Cost of the best plan of all candidates; infinite if none was found.
 pub(super) fn least_cost(candidates: &[Candidate<'_>]) -> f64 {
     candidates
         .iter()
@@ -113,7 +114,7 @@ pub(super) fn least_cost(candidates: &[Candidate<'_>]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// No plan of any candidate costs less.
+/// Proven bound: no plan of any candidate costs less.
 pub(super) fn lower_bound(candidates: &[Candidate<'_>]) -> f64 {
     candidates
         .iter()
@@ -123,8 +124,8 @@ pub(super) fn lower_bound(candidates: &[Candidate<'_>]) -> f64 {
 
 /// Proves a lower bound for each of `candidates` and adds better plans to their pools.
 ///
-/// A bound at or above the least cost of all closes a candidate: nothing with that key is better than what is
-/// known.
+/// A bound at or above the least cost of all closes a candidate: no plan with that key is better than the
+/// best known.
 pub(super) fn prove(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
@@ -133,7 +134,7 @@ pub(super) fn prove(
 ) -> Result<(), Cancelled> {
     let mut per_question = budget.first_per_piece * space.n;
     while budget.n_left > 0 && lower_bound(candidates) < least_cost(candidates) {
-        // First the whole question of each key: is there any better plan?
+        // First the full question for each key: is there any better plan?
         for i in 0..candidates.len() {
             let mut is_answered = true;
             while is_answered && budget.n_left > 0 && candidates[i].lower_bound < least_cost(candidates) {
@@ -156,7 +157,7 @@ pub(super) fn prove(
     Ok(())
 }
 
-/// Easier questions: raises the least of the bounds as far as questions of this size can.
+/// Raises the least of the bounds by easier questions, as far as questions of this size can.
 fn bisect(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
@@ -166,12 +167,12 @@ fn bisect(
 ) -> Result<(), Cancelled> {
     let mut high = just_below(least_cost(candidates));
     if !high.is_finite() {
-        // While no plan is known there is no scale for them.
+        // Without a known plan, there is no scale for these questions.
         return Ok(());
     }
     while high - lower_bound(candidates) > FINEST_STEP * high && budget.n_left > 0 {
         let middle = 0.5 * (lower_bound(candidates) + high);
-        // One key that leaves the question open leaves it open for all.
+        // If one key leaves the question open, it stays open for all.
         let Some(i) = candidates.iter().position(|c| c.lower_bound < middle) else {
             break;
         };
@@ -187,15 +188,16 @@ fn bisect(
     Ok(())
 }
 
-/// Limits of further plans, as shares of the least cost: some as good in the worst piece, some nearly.
+/// Cost limits of further plans, as multiples of the least cost: some as good in the worst piece, some
+/// nearly.
 const FURTHER_LIMITS: [f64; 4] = [1.0, 1.0, 1.01, 1.03];
 
-/// How many further plans are asked for, and the revisions for each, per piece.
+/// Number of further plans to search for, and revisions for each, per piece.
 const N_FURTHER: usize = 16;
 const FURTHER_BUDGET_PER_PIECE: usize = 60;
 
-/// Adds plans nearly as good as the best of `pool`, found by deciding in random order: with a lower mean, or
-/// only different.
+/// Adds plans nearly as good as the best of `pool`, found by deciding in random order. They have a lower mean
+/// or are merely different.
 pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, rng: &mut ChaCha8Rng) {
     let least = pool.least_cost();
     let tries: Vec<(f64, Vec<f64>)> = (0..N_FURTHER)
@@ -221,7 +223,7 @@ pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut
             weights,
             is_time_up: false,
         };
-        // Plans are many at such limits: striking out roles one by one would only cost time.
+        // Many plans exist at such limits, so removing roles one by one would only cost time.
         let mut d = probe.propagator.all();
         let is_none = probe.narrows_to_nothing(&mut d, space.all());
         let answer = if is_none {
@@ -242,7 +244,7 @@ pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut
     }
 }
 
-/// One question, with at most `n_revisions` revisions of a piece.
+/// Answers one question with at most `n_revisions` revisions.
 fn ask(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
@@ -276,25 +278,25 @@ struct Probe<'a> {
     ctx: &'a Ctx<'a>,
     propagator: Propagator<'a>,
     limit: f64,
-    /// Revisions after which the question is left open.
+    /// Greatest number of revisions; beyond it the question stays open.
     n_revisions: usize,
     n_decisions: usize,
-    /// Decisions of this run.
+    /// Greatest number of decisions in this run.
     run: usize,
-    /// How often each piece was at fault.
+    /// Weight of each piece, which grows by 1 with each conflict there.
     weights: &'a mut Vec<f64>,
     is_time_up: bool,
 }
 
-/// Something that is still open.
+/// A decision that is still open.
 enum Question {
     Role(PatchId),
-    /// Which piece of a contact is later.
+    /// Choice of the later piece of a contact.
     Later(usize),
 }
 
 impl Probe<'_> {
-    /// The answer, after all that propagation alone can tell.
+    /// Answers the question by propagation and, if that is not enough, by search.
     fn proof(&mut self) -> Answer {
         let mut d = self.propagator.all();
         let all = self.propagator.space.all();
@@ -307,7 +309,7 @@ impl Probe<'_> {
         self.with_restarts(&d)
     }
 
-    /// Decides what is open in `d`, from the start again each time that a run led nowhere.
+    /// Decides what is open in `d`. Starts again each time that a run ends without an answer.
     fn with_restarts(&mut self, d: &Domains) -> Answer {
         let mut run = FIRST_RUN as f64;
         loop {
@@ -335,7 +337,7 @@ impl Probe<'_> {
         }
     }
 
-    /// Strikes out every role that leads to nothing by propagation alone.
+    /// Removes every role that propagation alone refutes. Returns an answer only if no role is left.
     fn shave(&mut self, d: &mut Domains) -> Option<Answer> {
         let n = self.propagator.space.n;
         let (mut since_change, mut p) = (0, 0);
@@ -360,7 +362,7 @@ impl Probe<'_> {
         None
     }
 
-    /// Decides what is open in `d`, one way after the other.
+    /// Decides what is open in `d`, one alternative after the other.
     fn decide(&mut self, d: &Domains) -> Answer {
         let Some(question) = self.question(d) else {
             return match sequence(self.propagator.space, d, self.limit) {
@@ -387,7 +389,7 @@ impl Probe<'_> {
         if is_open { Answer::Unknown } else { Answer::None }
     }
 
-    /// What to decide next: few ways, and often at fault.
+    /// Next decision: the one with few alternatives and many conflicts.
     fn question(&self, d: &Domains) -> Option<Question> {
         let mut best: Option<(f64, Question)> = None;
         let mut offer = |dispute: f64, question| {
@@ -409,7 +411,7 @@ impl Probe<'_> {
         best.map(|b| b.1)
     }
 
-    /// The ways to decide, cheapest first, and the pieces they change.
+    /// Alternatives of a decision, for a role cheapest first, with the pieces that they change.
     fn children(&self, d: &Domains, question: &Question) -> Vec<(Domains, PieceSet)> {
         match *question {
             Question::Role(p) => {

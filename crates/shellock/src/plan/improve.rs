@@ -1,5 +1,5 @@
 //! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.2), then for
-//! all others, which may lower the mean where the worst piece cannot be helped.
+//! all others. The last step may lower the mean if the worst piece cannot be improved.
 
 use super::key::KeyChoice;
 use super::local_cost::{Role, Surroundings, mask_of};
@@ -8,19 +8,20 @@ use super::space::Space;
 use super::{LatticePlan, PieceSet};
 use crate::{IdVec, LatticeDirection, PatchId};
 
-/// Improvements after which a plan is left as it is: a bound on time, since each one lowers the cost anyway.
+/// Improvements after which a plan is left as it is. Bounds the time only, since each one lowers the cost
+/// anyway.
 const MAX_IMPROVEMENTS: usize = 100;
 
-/// A plan, what it costs, and how many others were looked at for it.
+/// An improved plan, its cost, and the number of plans evaluated for it.
 pub(super) struct Improved {
     pub score: PlanScore,
     pub plan: LatticePlan,
     pub n_evaluations: usize,
 }
 
-/// A plan of the same order that is at least as good as `plan`, which keeps all conditions.
+/// Finds a plan of the same order that is at least as good as `plan`, which must satisfy all conditions.
 ///
-/// Stops where no single change of direction helps.
+/// Stops when no change of a single direction helps.
 pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: LatticePlan) -> Improved {
     let mut best = Improved {
         score: space.score(&plan),
@@ -38,7 +39,7 @@ pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: LatticePlan) -> 
     best
 }
 
-/// The worst piece, its neighbours by cost, then all others by cost.
+/// Order of improvement: the worst piece and its neighbours by cost, then all others by cost.
 fn worst_first(space: &Space<'_>, score: &PlanScore) -> Vec<PatchId> {
     let mut by_cost: Vec<PatchId> = score.pieces.ids().collect();
     by_cost.sort_by(|&x, &y| score.pieces[y].total_cmp(&score.pieces[x]).then(x.cmp(&y)));
@@ -49,7 +50,7 @@ fn worst_first(space: &Space<'_>, score: &PlanScore) -> Vec<PatchId> {
     first
 }
 
-/// Turns `piece` to the best other direction, where one is better.
+/// Turns `piece` to the best other direction, if one improves the plan. Returns true if so.
 fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId) -> bool {
     let at = best.plan.position(piece);
     if at == 0 {
@@ -77,8 +78,8 @@ fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId)
     is_improved
 }
 
-/// The score where `piece` leaves along `s`: only its own cost and those of its earlier neighbours change
-/// from `costs`.
+/// Score of the plan if `piece` leaves along `s`. Only its own cost and those of its earlier neighbours
+/// differ from `costs`.
 fn turned(
     space: &Space<'_>,
     around: &mut [(Role, Surroundings)],

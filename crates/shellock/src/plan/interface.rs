@@ -1,9 +1,10 @@
-//! How good a connector each seam could carry, for either order of its two pieces and all 26 directions (Eq.
-//! 4).
+//! Quality of the connectors that each seam could carry, for either order of its two pieces and all 26
+//! directions (Eq. 4).
 //!
-//! At a sample of the seam: `u` tangent, `N` outward normal made perpendicular to `u`, `v` perpendicular to
-//! both, from the later piece p to the earlier q; `s` the direction along which p leaves. The connector of
-//! the paper becomes shallow where `s` runs along the seam and leans backward where `s` points towards q:
+//! At a sample of the seam, `u` is the tangent and `N` the outward normal, made perpendicular to `u`. `v` is
+//! perpendicular to both and points from the later piece p to the earlier q. `s` is the direction along which
+//! p leaves. The connector of the paper becomes shallow if `s` runs along the seam, and leans backward if `s`
+//! points towards q:
 //!
 //! ```text
 //!        N, T = 0: pulls straight out          the male piece is p where s · N ≥ 0,
@@ -12,7 +13,7 @@
 //! ```
 //!
 //! Limits: connectors lie on the inner side of the wall, whose edge is estimated from the outer surface
-//! (`interface::sample`); carving may shift it. Other pieces than the two may obstruct a connector, which
+//! (`interface::sample`); carving may shift it. Pieces other than the two may obstruct a connector, which
 //! shows only later.
 
 mod blocking;
@@ -33,23 +34,23 @@ use crate::seam::rules::{
 };
 use crate::{ConnectorSizes, LatticeDirection, PatchId, Seam, SegmentedSurface};
 
-/// What the seams between two pieces offer for one order and one direction.
+/// Connectors possible on the seams between two pieces, for one order and one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Joint {
     /// Weight `w` of Eq. 4, mean over the seams' length; in [β, 1 + β], lower is better.
     ///
-    /// The mean and not a high quantile: a seam around a piece has some stretch along any `s`, so quantiles
-    /// are all near 1.
+    /// The mean and not a high quantile: a seam around a piece has some stretch along any `s`, so high
+    /// quantiles are all near 1.
     pub weight: f64,
     /// Share of the seams' length on which a connector can be made, in [0, 1].
     pub usable: f64,
     /// Longest single run of connectors, mm.
     pub run_mm: f64,
-    /// Whether that run is long enough to hold, see [`Interface::count_runs_from`].
+    /// True if that run is long enough to hold, see [`Interface::count_runs_from`].
     pub holds: bool,
 }
 
-/// Two pieces that touch along seams.
+/// The contact of two pieces that share seams.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// The piece with the lower id.
@@ -60,45 +61,45 @@ pub struct Interface {
     pub length_mm: f64,
     /// Size D of their connectors, mm.
     pub size_mm: f64,
-    /// By who is later (a, then b) and by direction.
+    /// Joints by order (`a` later, then `b` later) and by direction.
     joints: [[Joint; LatticeDirection::COUNT]; 2],
     hold: BlockingTable,
 }
 
-/// The frame of a seam as its later piece sees it: three unit vectors perpendicular to each other.
+/// The frame of a seam as seen from its later piece: three perpendicular unit vectors.
 #[derive(Clone, Copy, Debug)]
 pub struct SeamFrame {
-    /// Along the seam.
+    /// Unit vector along the seam.
     pub tangent: Vec3,
-    /// Out of the surface.
+    /// Unit vector out of the surface.
     pub normal: Vec3,
-    /// From the later piece to the earlier one.
+    /// Unit vector from the later piece to the earlier one.
     pub across: Vec3,
 }
 
 impl SeamFrame {
-    /// Whether a connector can be made where the later piece leaves along the unit vector `s`.
+    /// Returns true if a connector can be made when the later piece leaves along the unit vector `s`.
     pub fn carries(&self, s: Vec3) -> bool {
-        // s' is s without its part along the seam; where q is the male piece both s and v turn, so their
-        // product stays.
+        // s' is s without its part along the seam. If q is the male piece, both s and v change sign, so their
+        // product stays the same.
         let (outwards, towards_female) = (s.dot(self.normal).abs(), s.dot(self.across));
         s.dot(self.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
     }
 
-    /// Whether the seam runs along `s`, so that the key can slide on a rail under it.
+    /// Returns true if the seam runs along `s`, so that the key can slide on a rail under it.
     pub fn carries_rail(&self, s: Vec3) -> bool {
         s.dot(self.tangent).abs() > MAX_ALONG_SEAM && s.dot(self.normal).abs() < MAX_OUT_OF_RAIL
     }
 
-    /// Weight `w` of Eq. 4, in [β, 1 + β]: large where `s` runs along the seam or towards the earlier piece.
+    /// Weight `w` of Eq. 4, in [β, 1 + β]: large if `s` runs along the seam or towards the earlier piece.
     pub fn weight(&self, s: Vec3, beta: f64) -> f64 {
         s.dot(self.tangent).abs().max(s.dot(self.across).max(0.0)) + beta
     }
 }
 
-/// How two pieces with connectors of `size_mm` meet at a station where the later one leaves along `s`; no
-/// connector where none can be made, unless `is_any_angle`; `is_on_rails` where the later one is the key and
-/// slides on rails.
+/// Contact of two pieces at a station, with connectors of `size_mm`, when the later one leaves along `s`. Has
+/// no connector if none can be made, unless `is_any_angle`. `is_on_rails` is true if the later piece is the
+/// key and slides on rails.
 pub(crate) fn meeting(
     station: &Station,
     size_mm: f64,
@@ -118,8 +119,8 @@ pub(crate) fn meeting(
         normal: station.normal,
         across,
     };
-    // Where s leads towards the earlier piece the face between the walls leans, so that it does not obstruct the
-    // way.
+    // If s leads towards the earlier piece, the face between the walls leans, so that it does not obstruct
+    // the way out.
     let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
     let lean = in_section.dot(across).max(0.0);
     let face = (across - lean * in_section).normalize_or(across);
@@ -137,7 +138,7 @@ pub(crate) fn meeting(
     };
     let pull_on_a = if a_is_later { s } else { -s };
     let is_rail = is_on_rails && frame.carries_rail(s);
-    // A rail holds across the seam; what leaves along it does so beside it.
+    // A rail holds across the seam. A piece that leaves along the rail passes beside it.
     let (male, leaves) = if is_rail {
         (earlier, station.normal)
     } else {
@@ -159,13 +160,13 @@ pub(crate) fn meeting(
 }
 
 impl Interface {
-    /// What joins the two where `later` is installed after the other and leaves along `s`.
+    /// Joint between the two if `later` is installed after the other and leaves along `s`.
     pub fn joint(&self, later: PatchId, s: LatticeDirection) -> &Joint {
         &self.joints[usize::from(later != self.a)][s.index()]
     }
 
-    /// What the two hold each other by in that case; `None` where the joint does not hold and for contacts
-    /// out of nothing.
+    /// Hold of that joint, by push. `None` if the joint does not hold, and for made-up contacts without a
+    /// table.
     pub fn hold(&self, later: PatchId, s: LatticeDirection) -> Option<&Pushes> {
         if !self.joint(later, s).holds {
             return None;
@@ -178,8 +179,8 @@ impl Interface {
         if piece == self.a { self.b } else { self.a }
     }
 
-    /// Lets exactly the joints hold whose run is at least so many connector sizes long; not shorter than the
-    /// survey's shortest of all.
+    /// Counts exactly the joints as holding whose run is at least `shortest_sizes` connector sizes long. The
+    /// value must not be below the shortest run that is made.
     pub fn count_runs_from(&mut self, shortest_sizes: f64) {
         let shortest_mm = shortest_sizes * self.size_mm;
         self.joints
@@ -188,12 +189,12 @@ impl Interface {
             .for_each(|j| j.holds = j.run_mm >= shortest_mm);
     }
 
-    /// Whether any order and direction makes a joint that holds.
+    /// Returns true if some order and direction makes a joint that holds.
     pub fn can_hold(&self) -> bool {
         self.joints.iter().flatten().any(|j| j.holds)
     }
 
-    /// A contact whose joints come from a function of the later piece and the direction; for made-up cases.
+    /// Makes up a contact for tests, with joints from a function of the later piece and the direction.
     #[cfg(test)]
     pub fn made_up(
         a: PatchId,
@@ -214,7 +215,7 @@ impl Interface {
     }
 }
 
-/// The contacts of all pairs that share a seam, sorted by pair.
+/// Contacts of all pairs that share a seam, sorted by pair.
 pub fn contacts(
     params: &PlanParams,
     surface: &SegmentedSurface,
@@ -245,7 +246,7 @@ fn contact(params: &PlanParams, sizes: &ConnectorSizes, seams: &[(&Seam, Vec<Lin
     let lines: Vec<&Line> = seams.iter().flat_map(|(_, lines)| lines).collect();
     let joints: [[Joint; LatticeDirection::COUNT]; 2] = [1.0, -1.0].map(|side| {
         std::array::from_fn(|i| {
-            // The frame of b later than a is that of a later with v turned round.
+            // The frame with b later than a is the one with a later, with v reversed.
             let s = LatticeDirection::all().nth(i).expect("26 directions");
             joint(params, size_mm, &lines, Way::new(params, [a, b], side, s))
         })
@@ -263,7 +264,8 @@ fn contact(params: &PlanParams, sizes: &ConnectorSizes, seams: &[(&Seam, Vec<Lin
     })
 }
 
-/// Evaluates the connectors under `lines` for one order and direction; without lines no connector is possible.
+/// Evaluates the connectors under `lines` for one order and direction. Without lines, no connector is
+/// possible.
 fn joint(params: &PlanParams, size_mm: f64, lines: &[&Line], way: Way) -> Joint {
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for line in lines {
@@ -379,7 +381,7 @@ mod tests {
         };
         assert!((up(40.0, 2.5).run_mm - 32.5).abs() <= 1.0);
         assert!(up(40.0, 2.5).holds && !up(12.0, 2.5).holds);
-        // What holds depends on the size alone: half the size, half the length.
+        // Only the ratio to the size decides: half the size needs half the length.
         assert!(up(12.0, 1.25).holds && !up(20.0, 5.0).holds);
     }
 }

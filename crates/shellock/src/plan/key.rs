@@ -1,4 +1,4 @@
-//! Which piece can be the key: the flattest, sliding out within its plane (Sect. 6.1).
+//! Choice of the key: the flattest piece, sliding out within its plane (Sect. 6.1).
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,22 +10,22 @@ use super::{PlanParams, PlanSurvey};
 use crate::key::plane::{Plane, Spot};
 use crate::{IdVec, LatticeDirection, PatchId, SegmentedSurface};
 
-/// Planes tried per piece.
+/// Candidate planes tried for each piece.
 const N_PLANES: usize = 64;
 
-/// Faces looked at per piece, so that a fine mesh costs no more than a coarse one.
+/// Greatest number of faces sampled for each piece, so that a fine mesh costs no more than a coarse one.
 const MAX_FACES: usize = 3000;
 
 /// Directions tried within the plane (Sect. 6.1).
 const N_IN_PLANE: usize = 8;
 
-/// Least share of a piece on its plane for a good key; below, its connectors cannot run straight.
+/// Least share of a piece on its plane for a good key. Below it, the connectors cannot run straight.
 const FLAT_SHARE: f64 = 0.5;
 
-/// How much less a key on top is liked than one underneath.
+/// Penalty on the rank of a key on top compared with one underneath, as a share.
 const VISIBLE_COST: f64 = 0.25;
 
-/// The plane nearest to a piece.
+/// The plane that fits a piece best.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flatness {
     /// Outward unit normal of the plane; zero where the piece has no area.
@@ -35,18 +35,19 @@ pub struct Flatness {
 }
 
 impl Flatness {
-    /// Of a piece without area.
+    /// Flatness of a piece without area.
     pub const NONE: Self = Self {
         normal: Vec3::ZERO,
         share: 0.0,
     };
 
-    /// Whether the piece makes a good key.
+    /// Returns true if the piece makes a good key.
     pub fn is_flat(self) -> bool {
         self.share >= FLAT_SHARE
     }
 
-    /// Up to eight lattice directions nearest to the plane's own, without repeats, in order round the plane.
+    /// Up to eight lattice directions nearest to directions in the plane, without repeats, in order round the
+    /// normal.
     pub fn in_plane(self) -> Vec<LatticeDirection> {
         if self.normal == Vec3::ZERO {
             return Vec::new();
@@ -64,8 +65,8 @@ impl Flatness {
     }
 }
 
-/// The nearest plane of every piece by RANSAC over its faces, refined by least squares; a random stream per
-/// piece.
+/// Fits the best plane to every piece by RANSAC over its faces, refined by least squares. Each piece has its
+/// own random stream.
 pub fn flatness(params: &PlanParams, surface: &SegmentedSurface) -> IdVec<PatchId, Flatness> {
     let mut faces = vec![Vec::new(); surface.n_patches];
     for (face, &patch) in surface.patch_of_face.iter().enumerate() {
@@ -115,41 +116,42 @@ fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Fla
     })
 }
 
-/// One way to choose the key: a piece and the directions it may take.
+/// One choice of the key: a piece and the directions that it may take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyChoice {
-    /// The piece.
+    /// Piece that is the key.
     pub piece: PatchId,
-    /// The directions to try, all of one kind.
+    /// Directions to try, all of one kind.
     pub directions: Vec<LatticeDirection>,
-    /// Which kind.
+    /// Kind of the directions.
     pub slides: KeyDirections,
-    /// Whether the piece is flat enough for straight connectors.
+    /// True if the piece is flat enough for straight connectors.
     pub is_flat: bool,
 }
 
 impl KeyChoice {
-    /// Whether nothing but the cost of plans makes one of them the better key.
+    /// Returns true if the two keys are equally flat and slide the same way, so that only the cost of their
+    /// plans decides between them.
     pub fn is_as_good_as(&self, other: &Self) -> bool {
         self.is_flat == other.is_flat && self.slides == other.slides
     }
 }
 
-/// Which way a key slides out.
+/// Kind of direction along which a key slides out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum KeyDirections {
-    /// Along one of the lattice directions nearest to its plane's own.
+    /// Along a lattice direction nearest to one in the key's plane.
     #[serde(rename = "within its plane")]
     WithinPlane,
-    /// Along one of all others.
+    /// Along one of the other lattice directions.
     #[serde(rename = "out of its plane")]
     OutOfPlane,
 }
 
-/// All choices, best first: flat pieces within their plane, then along other directions, then pieces that are
-/// not flat.
+/// All choices of the key, best first: flat pieces within their plane, flat pieces along other directions,
+/// then pieces that are not flat, in the same order.
 ///
-/// Pieces are ranked by share on the plane times the root of their area, hidden ones first.
+/// Pieces are ranked by the share on their plane times the root of their area, hidden ones first.
 pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
     let up = Vec3::from(params.up).normalize_or_zero();
     let rank = |p: PatchId| {
@@ -163,7 +165,7 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
         .collect();
     pieces.sort_by(|&x, &y| rank(y).total_cmp(&rank(x)).then(x.cmp(&y)));
     if let (Some(piece), Some(slide)) = (params.key, params.key_slide) {
-        // A key that was cut as such: its rails are straight whatever else it is.
+        // The piece was cut as a key, so its rails are straight whatever its shape.
         let slides = KeyDirections::WithinPlane;
         return vec![KeyChoice {
             piece,

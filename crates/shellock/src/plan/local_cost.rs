@@ -1,29 +1,30 @@
-//! What a piece costs, as a function of what is known around it when it is taken off (Sect. 5.3).
+//! Cost of a piece, as a function of what is known around it when it is removed (Sect. 5.3).
 //!
-//! Pieces are taken off from the key on. When piece p leaves along `s_p`, the directions of its neighbours
-//! that left before are known, and those that stay were installed earlier and leave along nothing of their
-//! own against p:
+//! Pieces are removed from the key on. When piece p leaves along `s_p`, the directions of the neighbours that
+//! left before are known. The neighbours that remain were installed earlier, so their own directions do not
+//! affect p:
 //!
 //! ```text
 //!        later neighbours r (gone)        p leaves along s_p        earlier neighbours q (still there)
 //!   seam p–r: piece r later, along s_r                          seam p–q: piece p later, along s_p
 //! ```
 //!
-//! So the cost of p depends on one [`SeamStates`] a seam, on its [`Role`], and on who remains in its way. The
-//! search asks for bounds while several states are still possible; where one is left, the bound is the cost.
+//! So the cost of p depends on one [`SeamStates`] for each seam, on its [`Role`], and on the pieces that
+//! remain in its way. The search asks for bounds while several states are still possible. Once a single state
+//! is left, the bound is the cost.
 
 use super::score::{ASKED_MM3, FIRM_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};
 use crate::push::N_PUSHES;
 use crate::{LatticeDirection, PatchId};
 
-/// A set of directions, as bits by index.
+/// A set of directions, one bit for each index.
 pub type DirectionMask = u32;
 
-/// All 26 directions.
+/// Mask of all 26 directions.
 pub const ALL_DIRECTIONS: DirectionMask = (1 << LatticeDirection::COUNT) - 1;
 
-/// The directions of a mask in order of their index.
+/// Iterates over the directions of a mask, in order of their index.
 pub fn directions_in(mask: DirectionMask) -> impl Iterator<Item = LatticeDirection> {
     let mut left = mask & ALL_DIRECTIONS;
     std::iter::from_fn(move || {
@@ -33,24 +34,24 @@ pub fn directions_in(mask: DirectionMask) -> impl Iterator<Item = LatticeDirecti
     })
 }
 
-/// The mask of `s` alone.
+/// Returns the mask of `s` alone.
 pub fn mask_of(s: LatticeDirection) -> DirectionMask {
     1 << s.index()
 }
 
-/// What a piece is in the order, and its direction.
+/// Place of a piece in the order, with its direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Installed last; leaves along this direction.
     Key(LatticeDirection),
     /// Neither first nor last; leaves along this direction.
     Between(LatticeDirection),
-    /// Installed first; leaves nothing.
+    /// Installed first; leaves no other piece.
     First,
 }
 
 impl Role {
-    /// The direction along which the piece leaves earlier ones.
+    /// Direction along which the piece leaves earlier ones.
     pub fn separation(self) -> Option<LatticeDirection> {
         match self {
             Self::Key(s) | Self::Between(s) => Some(s),
@@ -59,29 +60,29 @@ impl Role {
     }
 }
 
-/// Roles that a piece may still have.
+/// The roles that are still possible for a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RoleSet {
-    /// Directions that it may leave along.
+    /// Directions along which the piece may leave.
     pub separations: DirectionMask,
-    /// Whether it may be the first.
+    /// True if the piece may be the first.
     pub may_be_first: bool,
-    /// Whether it is the key.
+    /// True if the piece is the key.
     pub is_key: bool,
 }
 
 impl RoleSet {
-    /// How many roles are left.
+    /// Number of roles that are left.
     pub fn len(self) -> usize {
         self.separations.count_ones() as usize + usize::from(self.may_be_first)
     }
 
-    /// Whether none is left.
+    /// Returns true if no role is left.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
 
-    /// The roles, directions first.
+    /// Iterates over the roles, directions first.
     pub fn iter(self) -> impl Iterator<Item = Role> {
         let role = move |s| {
             if self.is_key {
@@ -95,7 +96,7 @@ impl RoleSet {
             .chain(self.may_be_first.then_some(Role::First))
     }
 
-    /// The set with `role` alone.
+    /// Returns the set with `role` alone.
     pub fn only(self, role: Role) -> Self {
         let separations = role.separation().map_or(0, mask_of);
         Self {
@@ -105,7 +106,7 @@ impl RoleSet {
         }
     }
 
-    /// The set without `role`.
+    /// Returns the set without `role`.
     pub fn without(self, role: Role) -> Self {
         let separations = self.separations & !role.separation().map_or(0, mask_of);
         Self {
@@ -116,49 +117,48 @@ impl RoleSet {
     }
 }
 
-/// What may become of one seam, seen from one of its pieces.
+/// Possible states of one seam, seen from one of its pieces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SeamStates {
-    /// Directions along which the piece may leave the neighbour, being the later one.
+    /// Directions along which the piece may leave the neighbour, if the piece is later.
     pub own: DirectionMask,
-    /// Directions along which the neighbour may leave the piece, being the later one.
+    /// Directions along which the neighbour may leave the piece, if the neighbour is later.
     pub others: DirectionMask,
 }
 
-/// What is around a piece when it leaves.
+/// Knowledge about the surroundings of a piece as it leaves.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Surroundings {
-    /// Its seams, in the order of the survey's contacts.
+    /// Seams of the piece, in the order of the survey's contacts.
     pub seams: Vec<SeamStates>,
-    /// Pieces that certainly remain; all of them where everything is known.
+    /// Pieces that certainly remain. Once everything is known, these are all that remain.
     pub remaining: PieceSet,
 }
 
-/// The cost of each piece, from its surroundings. The bottleneck over all pieces is the cost of a plan.
+/// Cost function of pieces, given their surroundings. The cost of a plan is the bottleneck over all pieces.
 ///
-/// A metric of another kind (Eq. 6: a maximum over pairs of directions at the piece's seams) needs `bound`
-/// alone.
+/// A metric of another kind (Eq. 6: a maximum over pairs of directions at the piece's seams) needs to
+/// implement `bound` alone.
 pub trait PieceCosts: Send + Sync {
-    /// A number that the cost of `piece` in `role` never falls below, whichever states are chosen of
-    /// `around`.
+    /// Lower bound on the cost of `piece` in `role`, whichever states of `around` are chosen.
     ///
-    /// It is the cost where each seam has one state left. Infinite where a seam has none that goes with
-    /// `role`.
+    /// Equals the cost once each seam has one state left. Infinite if a seam has no state that is compatible
+    /// with `role`.
     fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64;
 
-    /// Whether the piece is held by less than the verification asks for, by estimate; never where the costs
-    /// know no hold.
+    /// Returns true if the piece is held by less than the verification requires, by estimate. Always false
+    /// for costs without a measure of hold.
     fn is_loose(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
         false
     }
 
-    /// Whether the piece is held by several times what the verification asks for, by estimate; always where the
-    /// costs know no hold.
+    /// Returns true if the piece is held by several times what the verification requires, by estimate. Always
+    /// true for costs without a measure of hold.
     fn is_firm(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
         true
     }
 
-    /// Strikes out roles and states that any choice with costs up to `limit` cannot use; may leave some in.
+    /// Removes roles and states that no choice with a cost up to `limit` can use. Some of these may stay in.
     fn narrow(&self, piece: PatchId, roles: &mut RoleSet, around: &mut Surroundings, limit: f64) {
         for role in roles.iter() {
             if self.bound(piece, role, around) > limit {
@@ -197,40 +197,40 @@ pub trait PieceCosts: Send + Sync {
     }
 }
 
-/// Hold of a piece by push, mm³.
+/// Hold of a piece for each push, mm³.
 type Hold = [f32; N_PUSHES];
 
-/// One seam of a piece: what either order and each direction contribute to the piece.
+/// Contribution of one seam to its piece, for either order and each direction.
 struct SeamTable {
-    /// Cost times length, by direction, where the piece is the later one and where the neighbour is.
+    /// Cost times length by direction: first with the piece later, then with the neighbour later.
     cost_mm: [[f64; LatticeDirection::COUNT]; 2],
-    /// The same for what is held.
+    /// Hold by direction, in the same order.
     hold: [Vec<Hold>; 2],
 }
 
-/// One piece.
+/// Cost tables of one piece.
 struct PieceTable {
     seams: Vec<SeamTable>,
-    /// Length of all its seams, mm; at least the least positive number.
+    /// Length of all its seams, mm; at least the smallest positive number.
     length_mm: f64,
     inward: [f64; LatticeDirection::COUNT],
-    /// What each other piece costs where it is in the way, by direction.
+    /// For each direction, cost of each other piece that is in the way.
     occluded: Vec<Vec<(PatchId, f64)>>,
 }
 
-/// The default cost: mean over the seams by length of Eq. 4's weight and of what cannot be used, the path,
-/// and missing hold.
+/// The default cost of a piece: the mean over its seams, by length, of Eq. 4's weight and of the unusable
+/// share, plus its path and its missing hold.
 pub struct SeamCosts {
     pieces: Vec<PieceTable>,
 }
 
-/// Slack of comparisons that subtract, in units of cost and in mm³; above rounding, so nothing possible is
-/// struck out.
+/// Slack of comparisons that subtract, in units of cost and in mm³. Above rounding, so that nothing possible
+/// is removed.
 const COST_SLACK: f64 = 1e-9;
 const HOLD_SLACK_MM3: f32 = 1e-3;
 
 impl SeamCosts {
-    /// Tables for what `survey` and `constraints` say. Cost: 52 entries of 66 numbers a seam.
+    /// Builds the tables for `survey` and `constraints`. Cost: 52 entries of 66 numbers for each seam.
     pub fn new(survey: &PlanSurvey, constraints: &PlanConstraints) -> Self {
         let n = survey.n_pieces;
         let mut pieces: Vec<PieceTable> = (0..n)
@@ -264,8 +264,8 @@ impl SeamCosts {
         Self { pieces }
     }
 
-    /// Estimated overlap, mm³, with which `piece` resists the push that it resists least; an upper bound
-    /// while seams are open.
+    /// Estimated overlap, mm³, with which `piece` resists its weakest push; infinite for the key. An upper
+    /// bound while seams are open.
     pub fn hold_mm3(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
         if let Role::Key(_) = role {
             return f64::INFINITY;
@@ -297,13 +297,13 @@ fn least(held: &Hold) -> f32 {
         .fold(f32::INFINITY, |x, y| if y < x { y } else { x })
 }
 
-/// What a piece costs that is held by `hold_mm3` alone.
+/// Cost of a piece for its missing hold, given that it is held by `hold_mm3`.
 fn loose_cost(hold_mm3: f64) -> f64 {
     LOOSE_COST * (1.0 - hold_mm3 / HELD_MM3).max(0.0)
 }
 
 impl SeamTable {
-    /// The least cost times length of what `others` allow; infinite where they allow nothing.
+    /// Least cost times length over the directions `others`; infinite if there are none.
     fn least_of_others(&self, others: DirectionMask) -> f64 {
         directions_in(others)
             .map(|s| self.cost_mm[1][s.index()])
@@ -316,7 +316,7 @@ impl SeamTable {
         most
     }
 
-    /// The least cost times length in `role`.
+    /// Least cost times length of the seam in `role`.
     fn least_cost_mm(&self, role: Role, states: SeamStates) -> f64 {
         self.with_own(role, states, self.least_of_others(states.others))
     }
@@ -328,7 +328,7 @@ impl SeamTable {
         }
     }
 
-    /// What is held where one state is left: nothing needs to be compared.
+    /// Hold of the only state left, without any comparison; `None` if several or none are left.
     fn only_held(&self, role: Role, states: SeamStates) -> Option<&Hold> {
         let own = role.separation().filter(|&s| states.own & mask_of(s) != 0);
         match (own, states.others) {
@@ -452,18 +452,18 @@ impl PieceCosts for SeamCosts {
     }
 }
 
-/// The best that each seam can give a piece in one role.
+/// The best contribution of each seam to a piece in one role.
 struct Choice {
     cost_mm: f64,
-    /// By seam.
+    /// Least cost times length, by seam.
     least_mm: Vec<f64>,
     hold: Hold,
-    /// By seam; empty for the key, which needs no hold.
+    /// Greatest hold, by seam; empty for the key, which needs no hold.
     most: Vec<Hold>,
 }
 
 impl Choice {
-    /// Adds what the next seam can hold.
+    /// Adds the greatest hold of the next seam.
     fn hold(&mut self, seam: &SeamTable, role: Role, states: SeamStates, most_of_others: &Hold) {
         let mut most = *most_of_others;
         if let Some(s) = role.separation().filter(|&s| states.own & mask_of(s) != 0) {
@@ -473,8 +473,8 @@ impl Choice {
         self.most.push(most);
     }
 
-    /// Keeps the states of seam `i` that go with the best of all other seams; `needed` hold, mm³, where any
-    /// is.
+    /// Keeps the states of seam `i` that suffice together with the best of all other seams. `needed` is the
+    /// required hold, mm³, if any.
     #[expect(
         clippy::too_many_arguments,
         reason = "one innermost step, with what its loops have at hand"

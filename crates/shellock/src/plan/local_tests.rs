@@ -1,8 +1,8 @@
-//! The local test set of the data-driven metric (Sect. 5.3): how far a straight seam opens, for 8 connector
+//! The local test set of the data-driven metric (Sect. 5.3): opening of a straight seam, for 8 connector
 //! orientations and 26 directions of the testing force.
 //!
-//! Two half-planes that meet in a seam, held at their outer ring, are simulated with the surface metric's
-//! solver; the middle of the seam is measured. Between the simulated cases `d` is piecewise linear: in the
+//! Two half-planes meet in a seam and are held at their outer ring. The surface metric's solver simulates
+//! them, and the middle of the seam is measured. Between the simulated cases, `d` is piecewise linear: in the
 //! connector's angle, and in the force over the triangles that the 26 directions make of the sphere.
 
 use shellock_geom::Vec3;
@@ -13,24 +13,24 @@ use shellock_mechanics::{Resistance, Station, SurfaceModel, SurfaceParams};
 use super::interface::{SeamFrame, meeting};
 use crate::LatticeDirection;
 
-/// Orientations of connectors about the seam.
+/// Number of orientations of connectors about the seam.
 pub const N_ORIENTATIONS: usize = 8;
 
-/// Squares along the seam and beside it, and their size, mm: the neighbourhood is about as large as a piece's
-/// half.
+/// Number of squares along the seam and beside it, and their size, mm. The neighbourhood is about as large as
+/// half a piece.
 const ALONG: usize = 8;
 const BESIDE: usize = 4;
 const EDGE_MM: f64 = 5.0;
 
-/// Opening of a seam, mm, at the separation force of the simulation.
+/// Openings of a seam, mm, at the separation force of the simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocalTests {
-    /// By orientation, then by the lattice direction of the force in the frame (u, N, v).
+    /// Openings by orientation, then by the lattice direction of the force in the frame (u, N, v).
     opening_mm: [[f64; LatticeDirection::COUNT]; N_ORIENTATIONS],
 }
 
 impl LocalTests {
-    /// Simulates all 208 cases; some milliseconds.
+    /// Simulates all 208 cases; takes some milliseconds.
     pub fn simulate(params: &SurfaceParams) -> Result<Self, SparseError> {
         let assembly = two_plates(ALONG, BESIDE, EDGE_MM);
         let model = SurfaceModel::with_held_points(params, &assembly, &outer_ring(ALONG, BESIDE))?;
@@ -38,8 +38,8 @@ impl LocalTests {
         let mut opening_mm = [[0.0; LatticeDirection::COUNT]; N_ORIENTATIONS];
         for (k, openings) in opening_mm.iter_mut().enumerate() {
             let (sin, cos) = angle_of(k).sin_cos();
-            // Side a is the later piece; a connector is made at any angle, good or bad: the weight w is for
-            // that.
+            // Side a is the later piece. A connector is made at any angle, good or bad, since the weight w
+            // accounts for that.
             let at = |s: &Station| {
                 meeting(
                     s,
@@ -64,8 +64,8 @@ impl LocalTests {
         Ok(Self { opening_mm })
     }
 
-    /// `d(u, v, s, f)`: the opening where the later piece leaves along `s` and is pulled by `f`, both unit
-    /// vectors, mm.
+    /// Opening `d(u, v, s, f)`, mm, if the later piece leaves along `s` and is pulled by `f`, both unit
+    /// vectors.
     pub fn opening_mm(&self, frame: &SeamFrame, s: Vec3, f: Vec3) -> f64 {
         let angle = s
             .dot(frame.across)
@@ -95,8 +95,8 @@ fn in_world(station: &Station, f: Vec3) -> Vec3 {
     f.x * station.tangent + f.y * station.normal + f.z * station.across
 }
 
-/// The three lattice directions around `f` with weights that sum to 1: an axis, a face diagonal and a space
-/// diagonal.
+/// The three lattice directions around `f`, an axis, a face diagonal and a space diagonal, with weights that
+/// sum to 1.
 fn corners_of(f: Vec3) -> [(LatticeDirection, f64); 3] {
     let mut axes = [0, 1, 2];
     axes.sort_by(|&x, &y| f[y].abs().total_cmp(&f[x].abs()));

@@ -1,5 +1,5 @@
-//! Plans near a plan, and the conditions that any must keep: what a search climbs through that has another
-//! objective than costs.
+//! Plans near a plan, and the conditions that each must satisfy. A search with an objective other than costs
+//! climbs through them.
 
 use std::collections::BTreeSet;
 
@@ -9,24 +9,25 @@ use super::space::{Relations, Space};
 use super::{FoundPlan, LatticePlan, LatticeStep, PlanConstraints, PlanParams, PlanSurvey, RankedPlan};
 use crate::{LatticeDirection, PatchId};
 
-/// The plans with the key of a plan that was found that keep all conditions under which it was found, and
-/// that cost no more than is allowed.
+/// Plans with the key of a found plan that satisfy all conditions of its search and cost no more than a
+/// limit.
 pub struct Neighbourhood<'a> {
     space: Space<'a>,
     key_ways: Vec<LatticeDirection>,
     most_cost: f64,
-    /// Pieces that hardly anything holds in the plan that was found; others may not be.
+    /// Pieces that are loose in the found plan. No other piece may be loose.
     loose: Vec<PatchId>,
-    /// Pieces that are not held firmly there; others must be.
+    /// Pieces that are not held firmly in the found plan. All others must be.
     infirm: Vec<PatchId>,
 }
 
-/// What tells plans apart that join different pieces, or along different ways.
+/// Identity of a plan. Plans with equal names join the same pieces along the same directions.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PlanName(Relations);
 
 impl<'a> Neighbourhood<'a> {
-    /// Around `found` and of its key; `survey` counts joints as `found` did ([`FoundPlan::counted`]).
+    /// Creates the neighbourhood of `found`, with its key. `survey` must count joints as `found` did
+    /// ([`FoundPlan::counted`]).
     pub fn new(
         params: &PlanParams,
         survey: &'a PlanSurvey,
@@ -47,7 +48,7 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// The plan with its costs, where it keeps all conditions.
+    /// Returns the plan with its costs if it satisfies all conditions.
     pub fn ranked(&self, plan: LatticePlan) -> Option<RankedPlan> {
         let score = self.space.score(&plan);
         if score.worst > just_above(self.most_cost) || !self.space.allows(&plan) {
@@ -59,13 +60,13 @@ impl<'a> Neighbourhood<'a> {
         (is_known && is_firm()).then_some(RankedPlan { plan, score, loose })
     }
 
-    /// Names a plan.
+    /// Returns the identity of a plan.
     pub fn name(&self, plan: &LatticePlan) -> PlanName {
         PlanName(self.space.relations(plan))
     }
 
-    /// Plans in which `piece` alone goes elsewhere: along another way, or earlier or later, none of them
-    /// `seen`; whether they keep the conditions is not looked at.
+    /// Plans in which `piece` alone changes: its direction or its place in the order. Plans in `seen` are
+    /// left out, and the new ones are added to `seen`. The conditions are not checked.
     pub fn moves(
         &self,
         plan: &LatticePlan,
@@ -98,8 +99,8 @@ impl<'a> Neighbourhood<'a> {
         plan
     }
 
-    /// The step at `at` comes to be the one at `to`. The way of a first piece says nothing: as others do, it
-    /// gets the one straight outwards, and so does the piece that was first.
+    /// Moves the step at `at` to `to`. The direction of a first piece has no meaning, so it is set straight
+    /// outwards as in other plans. A piece that was first gets that direction, too.
     fn moved(&self, plan: &LatticePlan, at: usize, to: usize) -> LatticePlan {
         let mut steps = plan.steps.clone();
         let step = steps.remove(at);

@@ -1,18 +1,19 @@
-//! Which outer patches are in each other's way (Sect. 6.2).
+//! Occlusion of outer patches by each other (Sect. 6.2).
 //!
 //! An orthographic camera looks along each of the 13 lines of the lattice. Every pixel keeps the list of
-//! *all* surface points on its ray, sorted by depth, so that one picture answers for both ends of the line
-//! and for all pairs:
+//! *all* surface points on its ray, sorted by depth. So one picture serves both directions of the line and
+//! all pairs:
 //!
 //! ```text
-//!   ray ──•p───────•q──•q────────•p──▶ s        p has q ahead of it at its first point, q has p ahead at both
+//!   ray ──•p───────•q──•q────────•p──▶ s    p has q ahead of it at its first point, q has p ahead at both
 //! ```
 //!
-//! The area of p with q ahead is positive along s exactly where the area of q with p ahead is along −s; the
-//! two amounts differ where one patch crosses a ray more often than the other.
+//! The area of p with q ahead is positive along s exactly if the area of q with p ahead is positive along −s.
+//! The two areas differ if one patch crosses a ray more often than the other.
 //!
-//! Faces along a line show nothing on it, though a piece cannot slide along a plane where the wall of another
-//! lies ahead in it: from each of them a walk over the surface finds what is ahead (`along_surface`).
+//! Faces parallel to a line do not show in its picture. But a piece cannot slide along a plane if the wall of
+//! another lies ahead in that plane. A walk over the surface from each such face finds what is ahead
+//! (`along_surface`).
 //!
 //! Limits: features thinner than a pixel may be missed; only outer patches are seen, walls are carved later.
 
@@ -24,40 +25,40 @@ use shellock_geom::topology::Topology;
 
 use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
-/// Pixels along the longest edge of the surface's box: 0.6 mm at 150 mm.
+/// Pixels along the longest edge of the surface's bounding box: 0.6 mm at 150 mm.
 ///
 /// The number of rays, and so the cost per layer of surface, is the same for any size of model.
 const PIXELS_ACROSS: f64 = 250.0;
 
-/// How much deeper than p, in pixels, a point of q must be to count as ahead: 0.02 mm at 150 mm.
+/// Least depth of a point of q beyond a point of p to count as ahead, in pixels: 0.02 mm at 150 mm.
 ///
 /// A ray through a seam meets both patches at one depth, up to rounding.
 const DEPTH_TIE_PIXELS: f64 = 1.0 / 30.0;
 
-/// Where the middle of pixel (0, 0) lies before the least corner of the picture, in pixels.
+/// Distance from the middle of pixel (0, 0) to the least corner of the picture, in pixels.
 ///
 /// Odd values, so that rays miss the edges of models whose faces follow the axes.
 const PIXEL_SHIFT: [f64; 2] = [0.37, 0.41];
 
-/// How much of each patch every other patch occludes, for all 26 directions.
+/// Area of each patch that every other patch occludes, for all 26 directions.
 #[derive(Clone, Debug, Default)]
 pub struct Occlusion {
     n: usize,
-    /// By direction.
+    /// One table for each direction.
     tables: Vec<Table>,
 }
 
-/// One direction: what each patch shows and hides.
+/// Projected and occluded areas of all patches along one direction.
 #[derive(Clone, Debug)]
 struct Table {
     total_mm2: Vec<f64>,
-    /// `[p · n + q]`.
+    /// Occluded area of p by q, at index `[p · n + q]`.
     occluded_mm2: Vec<f64>,
-    /// The occluded point of p that q would hit first, and how far it is before q, mm.
+    /// The occluded point of p that would hit q first, with its distance to q, mm.
     first_hit: Vec<Option<(f64, Vec3)>>,
 }
 
-/// One crossing of a ray and the surface.
+/// One crossing of a ray with the surface.
 #[derive(Clone, Copy)]
 struct Fragment {
     pixel: u32,
@@ -65,7 +66,7 @@ struct Fragment {
     depth_mm: f64,
 }
 
-/// An orthographic picture's coordinates: right and up in pixels, depth along the line in mm.
+/// Coordinates of an orthographic picture: right and up in pixels, depth along the line in mm.
 struct Camera {
     right: Vec3,
     up: Vec3,
@@ -78,7 +79,7 @@ struct Camera {
 }
 
 impl Occlusion {
-    /// Looks at `surface` along all lines. Cost: 13 rasterisations of the mesh, whatever the number of
+    /// Measures `surface` along all lines. Cost: 13 rasterisations of the mesh, whatever the number of
     /// patches.
     pub fn measure(surface: &SegmentedSurface) -> Self {
         let n = surface.n_patches;
@@ -100,7 +101,7 @@ impl Occlusion {
         Self { n, tables }
     }
 
-    /// A table without any occlusion where every patch shows 1 mm²; for made-up cases.
+    /// A made-up table without occlusion for tests, in which every patch shows 1 mm².
     #[cfg(test)]
     pub fn none(n: usize) -> Self {
         let table = Table {
@@ -114,14 +115,14 @@ impl Occlusion {
         }
     }
 
-    /// Says that q hides this share of p along s.
+    /// Makes q occlude this share of p along s.
     #[cfg(test)]
     pub fn occlude(&mut self, p: PatchId, q: PatchId, s: LatticeDirection, share: f64) {
         let at = self.at(p, q);
         self.tables[s.index()].occluded_mm2[at] = share * self.total_mm2(p, s);
     }
 
-    /// Says that q hides all of p along s.
+    /// Makes q occlude all of p along s.
     #[cfg(test)]
     pub fn block(&mut self, p: PatchId, q: PatchId, s: LatticeDirection) {
         let at = self.at(p, q);
@@ -129,18 +130,18 @@ impl Occlusion {
         self.tables[s.index()].first_hit[at] = Some((0.0, Vec3::ZERO));
     }
 
-    /// Projected area of all layers of `p` along `s`, and area of what lies along `s`, mm².
+    /// Projected area of all layers of `p` along `s`, plus the true area of its faces parallel to `s`, mm².
     pub fn total_mm2(&self, p: PatchId, s: LatticeDirection) -> f64 {
         self.tables[s.index()].total_mm2[usize::from(p)]
     }
 
-    /// Of [`total_mm2`](Self::total_mm2) that which has `q` ahead of it along `s`, mm²; what lies along `s`
-    /// counts fourfold, so that it can be more than the total.
+    /// Part of [`total_mm2`](Self::total_mm2) that has `q` ahead of it along `s`, mm². Faces parallel to `s`
+    /// count fourfold, so the value can exceed the total.
     pub fn occluded_mm2(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         self.tables[s.index()].occluded_mm2[self.at(p, q)]
     }
 
-    /// Share of `p` that has `q` ahead of it along `s`, in [0, 1]; 0 where `p` is not seen at all.
+    /// Share of `p` that has `q` ahead of it along `s`, in [0, 1]; 0 if `p` is not visible at all.
     pub fn share(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         let total = self.total_mm2(p, s);
         if total > 0.0 {
@@ -150,7 +151,7 @@ impl Occlusion {
         }
     }
 
-    /// The point of `p` that hits `q` first on its way along `s`, mm; `None` where nothing is in the way.
+    /// Point of `p` that hits `q` first on its way along `s`, mm; `None` if `q` is not in the way.
     pub fn first_hit(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> Option<Vec3> {
         self.tables[s.index()].first_hit[self.at(p, q)].map(|(_, at)| at)
     }
@@ -207,7 +208,7 @@ impl Camera {
     }
 }
 
-/// The tables of `s` and of its opposite.
+/// Tables of `s` and of its opposite.
 fn look_along(surface: &SegmentedSurface, s: LatticeDirection) -> [Table; 2] {
     let camera = Camera::new(surface, s);
     let fragments = by_pixel(&camera, &rasterise(surface, &camera));
@@ -253,7 +254,7 @@ fn rasterise(surface: &SegmentedSurface, camera: &Camera) -> Vec<Fragment> {
     fragments
 }
 
-/// The fragments sorted by pixel, then depth, then patch.
+/// Fragments sorted by pixel, then depth, then patch.
 fn by_pixel(camera: &Camera, fragments: &[Fragment]) -> Vec<Fragment> {
     let mut starts = vec![0_u32; camera.width * camera.height + 1];
     for f in fragments {
@@ -274,11 +275,11 @@ fn by_pixel(camera: &Camera, fragments: &[Fragment]) -> Vec<Fragment> {
     sorted
 }
 
-/// Collects the rays of one picture into the tables of both directions.
+/// Accumulates the rays of one picture into the tables of both directions.
 struct Tally {
     n: usize,
     tables: [Table; 2],
-    /// Which fragment counted q last, so that a fragment counts each q once.
+    /// Number of the last fragment that counted q, so that a fragment counts each q once.
     counted_by: Vec<u32>,
     n_fragments: u32,
 }
@@ -306,7 +307,7 @@ impl Tally {
         }
     }
 
-    /// Counts the patches of `ahead`, nearest first, as in the way of `f`.
+    /// Counts the patches of `ahead`, nearest first, as occluding `f`.
     fn count<'a>(
         &mut self,
         side: usize,
@@ -335,7 +336,7 @@ impl Tally {
 }
 
 impl Table {
-    /// Counts so much of a patch as occluded for a `pair`, at a point that meets the other after `gap_mm`.
+    /// Counts `area_mm2` as occluded for a `pair`, at a point that reaches the other patch after `gap_mm`.
     fn occlude(&mut self, pair: usize, area_mm2: f64, gap_mm: f64, at: Vec3) {
         self.occluded_mm2[pair] += area_mm2;
         if self.first_hit[pair].is_none_or(|(least, _)| gap_mm < least) {
@@ -378,7 +379,7 @@ mod tests {
         let (low, high) = (PatchId(0), PatchId(1));
         assert_eq!(occlusion.share(high, low, direction(0.0, 0.0, 1.0)), 0.0);
         assert!(occlusion.share(high, low, direction(0.0, 0.0, -1.0)) > 0.97);
-        // Sideways each hemisphere is its own shade: the seam is level, up to a row of triangles.
+        // Sideways, each hemisphere occludes only itself: the seam is level, up to a row of triangles.
         assert!(occlusion.share(high, low, direction(1.0, 0.0, 0.0)) < 0.01);
         let disk_mm2 = std::f64::consts::PI * 2500.0;
         assert!((occlusion.total_mm2(high, direction(0.0, 0.0, 1.0)) / disk_mm2 - 1.0).abs() < 0.02);
@@ -392,7 +393,7 @@ mod tests {
         assert_eq!(occlusion.share(cap, rest, direction(0.0, 0.0, 1.0)), 0.0);
         let down = direction(0.0, 0.0, -1.0);
         assert!(occlusion.share(cap, rest, down) > 0.99);
-        // Downwards the rim is nearest to what is below it, though that is still the chord 2 · 30 mm away.
+        // Of the cap, the rim is nearest to what is below it, though that is still the chord 2 · 30 mm away.
         let hit = occlusion.first_hit(cap, rest, down).unwrap();
         assert!(hit.z < 34.0, "{hit}");
     }

@@ -1,48 +1,48 @@
-//! What the user may set about planning.
+//! Parameters of planning that the user may set.
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
 use crate::{LatticeDirection, PatchId};
 
-/// How plans are judged and searched. Lengths in mm.
+/// Parameters by which plans are judged and searched. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PlanParams {
-    /// Seed of all random streams of the stage; the same seed gives the same plan on any number of threads.
+    /// Seed of all random streams of this stage. One seed gives one plan on any number of threads.
     pub seed: u64,
-    /// Wall thickness: seams are as long as on the inner side of the wall, where connectors are. [0, 10]; 0,
-    /// the outer surface.
+    /// Wall thickness. [0, 10]; 0, the outer surface. Seam lengths are those on the inner side of the wall,
+    /// where connectors lie.
     pub wall_mm: f64,
-    /// Gap between mating faces. [0.03, 0.6]; 0.12. What a push must cross before it is resisted.
+    /// Gap between mating faces. [0.03, 0.6]; 0.12. A push must cross this gap before it is resisted.
     pub clearance_mm: f64,
     /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
     ///
     /// Keeps a perfect connector from costing nothing at all.
     pub beta: f64,
-    /// Share of a piece that another may occlude while it still counts as free. [0, 0.2]; 0.01. Carving
-    /// absorbs it.
+    /// Share of a piece that another may occlude while the path still counts as free. [0, 0.2]; 0.01. Carving
+    /// absorbs this share.
     pub occlusion_tolerance: f64,
-    /// The tolerance tried, with a warning, where the first gives no plan. [`occlusion_tolerance`, 0.2];
-    /// 0.03.
+    /// Occlusion tolerance of a second attempt, with a warning, if the first gives no plan.
+    /// [`occlusion_tolerance`, 0.2]; 0.03.
     ///
     /// [`occlusion_tolerance`]: Self::occlusion_tolerance
     pub relaxed_tolerance: f64,
-    /// The piece to be the key; the flattest that works where `None`.
+    /// Piece to use as the key. `None` takes the flattest piece that works.
     pub key: Option<PatchId>,
-    /// The only direction `key` may leave along, with rails under its sides; any of the 26, without rails,
-    /// where `None`.
+    /// Only direction along which `key` may leave, with rails under its sides. `None` allows any of the 26,
+    /// without rails.
     pub key_slide: Option<LatticeDirection>,
-    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    /// Up direction of the standing model; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
-    /// Plans that the random search compares. [1, 100 000]; 300.
+    /// Number of plans that the random search compares. [1, 100 000]; 300.
     pub n_plans: usize,
-    /// Pieces that the random search may take off in all before it gives up. [1, 10⁸]; 200 000.
+    /// Number of pieces that the random search may remove in all before it gives up. [1, 10⁸]; 200 000.
     ///
-    /// A bound on hopeless cases, for each of the two tolerances; where plans exist the search ends long
-    /// before.
+    /// Bounds hopeless cases, for each counted run length and each of the two tolerances. If plans exist, the
+    /// search ends long before.
     pub max_tries: usize,
-    /// Work that the exact search may do: pieces revised. [0, 10⁹]; 100 000. Without any only the trivial
+    /// Work limit of the exact search: number of pieces revised. [0, 10⁹]; 100 000. With 0, only the trivial
     /// bound 0 is proven.
     pub proof_budget: usize,
 }
@@ -67,12 +67,12 @@ impl Default for PlanParams {
 }
 
 impl PlanParams {
-    /// Whether the later piece of a pair is the key that slides on rails along `s`.
+    /// Returns true if `later`, the later piece of a pair, is the key that slides on rails along `s`.
     pub(crate) fn slides_on_rails(&self, later: PatchId, s: LatticeDirection) -> bool {
         self.key == Some(later) && self.key_slide == Some(s)
     }
 
-    /// Every problem at once, in words that say what to do; empty where all is well.
+    /// Returns every problem at once, with advice on what to do; empty if all values are valid.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = Vec::new();
         let mut range = |name: &str, value: f64, low: f64, high: f64| {

@@ -1,4 +1,4 @@
-//! Small sets of pieces, so that the search and the cluster test run in microseconds.
+//! Small sets of pieces as bits, so that the search and the cluster test run in microseconds.
 
 use crate::PatchId;
 
@@ -7,10 +7,10 @@ use crate::PatchId;
 pub struct PieceSet(u128);
 
 impl PieceSet {
-    /// Ids in a set are below this.
+    /// Exclusive upper bound on the ids in a set.
     pub const MAX_PIECES: usize = 128;
 
-    /// The empty set.
+    /// The set without any pieces.
     pub const EMPTY: Self = Self(0);
 
     /// The pieces 0 … n − 1; `n` ≤ [`Self::MAX_PIECES`].
@@ -23,32 +23,32 @@ impl PieceSet {
         }
     }
 
-    /// The set of `piece` alone.
+    /// Creates the set of `piece` alone.
     pub fn one(piece: PatchId) -> Self {
         Self(1 << piece.0)
     }
 
-    /// How many pieces are in it.
+    /// Number of pieces in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// Whether there are none.
+    /// Returns true if the set has no pieces.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether `piece` is in it.
+    /// Returns true if the set contains `piece`.
     pub fn contains(self, piece: PatchId) -> bool {
         self.0 >> piece.0 & 1 == 1
     }
 
-    /// The pieces of either.
+    /// Pieces that are in at least one of the sets.
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// The pieces of both.
+    /// Pieces that are in both sets.
     pub fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
@@ -68,7 +68,7 @@ impl PieceSet {
         })
     }
 
-    /// Everything that arcs lead to from `start`, itself included; `arcs` holds each piece's targets.
+    /// Pieces that arcs lead to from `start`, `start` included. `arcs` holds the targets of each piece.
     pub fn reached_from(start: PatchId, arcs: &[Self]) -> Self {
         let mut seen = Self::one(start);
         let mut front = seen;
@@ -82,13 +82,14 @@ impl PieceSet {
         seen
     }
 
-    /// Whether the pieces of the set hang together by `neighbours`, symmetric; true for the empty set.
+    /// Returns true if `neighbours`, a symmetric relation, connects the pieces of the set; true for the empty
+    /// set.
     pub fn is_connected(self, neighbours: &[Self]) -> bool {
         self.is_joined_within(self, neighbours)
     }
 
-    /// Whether the pieces of the set hang together by themselves and the other pieces of `bridges`; true for
-    /// the empty set.
+    /// Returns true if the pieces of the set are connected to each other directly or through pieces of
+    /// `bridges`; true for the empty set.
     pub fn is_joined_within(self, bridges: Self, neighbours: &[Self]) -> bool {
         let Some(start) = self.iter().next() else {
             return true;

@@ -1,4 +1,4 @@
-//! The best plans found so far that differ in what they join (Sect. 6.2).
+//! The best plans found so far that differ in their relations (Sect. 6.2).
 
 use std::collections::BTreeMap;
 
@@ -6,23 +6,23 @@ use super::LatticePlan;
 use super::score::{PlanScore, rounded};
 use super::space::{Relations, Space};
 
-/// Plans kept.
+/// Greatest number of plans kept.
 pub(super) const MOST_PLANS: usize = 100;
 
 /// Different plans, best first.
 #[derive(Default)]
 pub(super) struct Pool {
     plans: Vec<(PlanScore, LatticePlan)>,
-    /// The least cost of each that was met, kept or not.
+    /// Least cost met with each set of relations, whether the plan was kept or not.
     seen: BTreeMap<Relations, f64>,
 }
 
 impl Pool {
-    /// Takes in a plan that keeps all conditions, unless one with the same relations was met before that
-    /// costs no more.
+    /// Adds a plan that satisfies all conditions, unless one with the same relations that costs no more was
+    /// met before.
     ///
-    /// Where pieces that do not touch are in each other's way, their order changes the cost, but not what is
-    /// joined.
+    /// Pieces that do not touch may still be in each other's way. Then their order changes the cost but not
+    /// the joints.
     pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: LatticePlan) {
         let relations = space.relations(&plan);
         match self.seen.get(&relations) {
@@ -33,7 +33,8 @@ impl Pool {
             None => {}
         }
         self.seen.insert(relations, score.worst);
-        // Of equal plans the one met first stays in front. Keys are rounded so that ties are an equivalence.
+        // Among equal plans, the one met first stays in front. Keys are rounded so that ties are an
+        // equivalence.
         let key = |s: &PlanScore| (rounded(s.worst), s.mean);
         let rank = key(&score);
         let at = self.plans.partition_point(|(s, _)| {
@@ -44,22 +45,22 @@ impl Pool {
         self.plans.truncate(MOST_PLANS);
     }
 
-    /// The best plan.
+    /// Best plan of the pool.
     pub fn best(&self) -> Option<&(PlanScore, LatticePlan)> {
         self.plans.first()
     }
 
-    /// Cost of the best plan; infinite where there is none.
+    /// Cost of the best plan; infinite if the pool is empty.
     pub fn least_cost(&self) -> f64 {
         self.best().map_or(f64::INFINITY, |b| b.0.worst)
     }
 
-    /// All plans, best first.
+    /// All plans in the pool, best first.
     pub fn plans(&self) -> &[(PlanScore, LatticePlan)] {
         &self.plans
     }
 
-    /// How many there are.
+    /// Number of plans in the pool.
     pub fn len(&self) -> usize {
         self.plans.len()
     }

@@ -1,4 +1,4 @@
-//! Random plans that keep every condition, for studies of metrics (Sect. 5.4).
+//! Random plans that satisfy every condition, for studies of metrics (Sect. 5.4).
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use super::space::Space;
 use super::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey};
 use crate::seam::rules::COUNTED_RUN_SIZES;
 
-/// Draws with the widest spread, which hardly look at costs, have this index among the spreads.
+/// Index of the widest spread, with which draws depend little on costs.
 const WIDEST: usize = 3;
-/// Draws per plan wanted after which a key is given up.
+/// Draws per wanted plan, after which a key is abandoned.
 const DRAWS_PER_PLAN: usize = 4;
 const TRIES_PER_PIECE: usize = 20;
 
-/// Up to `n` different plans with one and the same key: of the key that has most within the allowed draws.
+/// Up to `n` different plans, all with one key: the one with the most plans within the allowed draws.
 pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<LatticePlan> {
     let constraints = PlanConstraints::default();
     let mut most = Vec::new();

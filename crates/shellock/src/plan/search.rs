@@ -1,14 +1,15 @@
-//! The search for the best plan (Sect. 6.2): drawn at random, improved, then proven.
+//! The search for the best plan (Sect. 6.2): random draws, local improvement, then a proof.
 //!
-//! Keys are tried in order of preference, until one has any plan. For it plans are drawn from the last piece
-//! to the first; all keys as good as it (equally flat, sliding the same way) are left to the exact search.
-//! Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does
-//! not depend on the threads. The cluster test prunes every step: what comes loose with the remaining pieces
-//! as one block can never lock. The cheapest plans of a batch are improved one direction at a time. At last
-//! [`exact`](super::exact) looks for better ones with any of the keys and proves how good any can be.
+//! Keys are tried in order of preference, until one has any plan. For that key, plans are drawn from the last
+//! piece to the first. All keys as good as it (equally flat, sliding the same way) are left to the exact
+//! search. Every draw has its own random stream, batches have a fixed size, and no clock is read, so the
+//! answer does not depend on the threads. The cluster test prunes every step: if a part is loose while the
+//! remaining pieces move as one block, the plan can never lock. The cheapest plans of a batch are improved
+//! one direction at a time. Finally, [`exact`](super::exact) looks for better plans with any of the keys and
+//! proves how good any can be.
 //!
-//! Deviation: the paper prunes by the best score so far, which would let threads influence each other; here
-//! the bound is that of the batches before.
+//! Deviation: the paper prunes by the best score so far, which would let threads influence each other. Here
+//! the bound is the best score of the batches before.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -29,37 +30,39 @@ use super::{
 use crate::seam::rules::COUNTED_RUN_SIZES;
 use crate::{Cancelled, Cause, Ctx, PatchId, Warning};
 
-/// Draws that run side by side before anybody looks at the results.
+/// Draws that run in parallel before their results are read.
 const BATCH: usize = 32;
 
-/// Batches without any plan after which a key is given up.
+/// Batches without any plan after which a key is abandoned.
 const MAX_EMPTY_BATCHES: usize = 2;
 
-/// Batches in a row that found nothing better, after which a full pool is left to the exact search: so many,
-/// and one more for each ten pieces.
+/// Batches in a row without improvement, after which a full pool is left to the exact search: this many, plus
+/// one for each ten pieces.
 ///
-/// That search proves the optimum of a figure in 12 pieces in less time than eight batches take.
+/// The exact search proves the optimum of a figure in 12 pieces in less time than eight batches take.
 const LEAST_STALE_BATCHES: usize = 2;
 const PIECES_PER_STALE_BATCH: usize = 10;
 
-/// Tries of one draw, per piece: enough to undo some wrong turns near the end; wrong beginnings need a new
-/// draw.
+/// Tries of one draw, per piece. Enough to undo some wrong choices near the end; a wrong beginning needs a
+/// new draw.
 const TRIES_PER_PIECE: usize = 20;
 
 /// Plans of a batch that are improved: the cheapest ones drawn.
 const N_IMPROVED: usize = 4;
 
-/// Keeps the streams of this stage's draws apart from those of the key planes, one a piece.
+/// First random stream of the draws. Separates them from the streams of the key planes, which use one for
+/// each piece.
 const FIRST_STREAM: u64 = 1 << 32;
 
-/// Makes the costs of pieces for what a survey and constraints say.
+/// Creates the costs of pieces for a survey and constraints.
 pub type MakeCosts<'a> = &'a dyn Fn(&PlanSurvey, &PlanConstraints) -> Box<dyn PieceCosts>;
 
-/// The best plan found for `survey` under `constraints` by the default costs, or why there is none.
+/// Finds the best plan for `survey` under `constraints` by the default costs, or the reason why there is
+/// none.
 ///
-/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised` and
-/// `short-joints`. Not promised: that none exists where none was found (but where the reason is the
-/// contacts', none does). How good the plan is among those with keys as good as its own is proven, see
+/// Short joints count only if no plan exists without them. Warns with `occlusion-tolerance-raised` and
+/// `short-joints`. Not promised: if no plan is found, one may still exist, unless the reason is in the
+/// contacts. The quality of the plan among those with equally good keys is proven, see
 /// [`FoundPlan::lower_bound`].
 pub fn search(
     ctx: &Ctx<'_>,
@@ -72,7 +75,7 @@ pub fn search(
     })
 }
 
-/// As [`search`], with other costs.
+/// Runs [`search`] with other costs.
 pub fn search_with(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -106,7 +109,7 @@ pub fn search_with(
             }
             return Ok(outcome);
         }
-        // What is wrong with all joints that hold well says best what to change.
+        // The diagnosis under the longest required run tells best what to change.
         first_answer.get_or_insert(outcome);
     }
     Ok(first_answer.expect("there is at least one length"))
@@ -167,8 +170,8 @@ fn warn_of_tolerance(ctx: &Ctx<'_>, tolerance: f64) {
     });
 }
 
-/// The best plan with a key as good as the first that has any; else the least that was left where the search
-/// got stuck.
+/// Best plan with a key as good as the first that has any plan; else the smallest set of pieces at which the
+/// search got stuck.
 fn with_any_key<'k>(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -207,7 +210,7 @@ fn with_any_key<'k>(
     Ok(Err(stuck))
 }
 
-/// The best plan with any of `candidates`, one of which has a plan already, and how good any can be.
+/// Best plan with any of `candidates`, one of which has a plan already, with proven bounds on all of them.
 fn proven<'k>(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -218,7 +221,7 @@ fn proven<'k>(
     prove(ctx, space, &mut candidates, &mut Budget::new(params.proof_budget))?;
     let (least_cost, lower_bound) = (least_cost(&candidates), lower_bound(&candidates));
     let keys: Vec<PatchId> = candidates.iter().map(|c| c.key.piece).collect();
-    // Of equals the key that is liked best.
+    // Among equals, the most preferred key wins.
     let best = candidates
         .iter()
         .position(|c| c.pool.least_cost() == least_cost)
@@ -231,7 +234,7 @@ fn proven<'k>(
         ..
     } = candidates.swap_remove(best);
     if pool.len() < MOST_PLANS {
-        // The exact search gave this key its best plan, but not the others that metrics choose from.
+        // The exact search gave this key its best plan, but not the others from which metrics choose.
         draw_plans(ctx, params, space, key, &mut tries_left, &mut pool, &mut draws)?;
     }
     if params.proof_budget > 0 {
@@ -250,7 +253,7 @@ fn proven<'k>(
         loose: space.loose(plan),
     };
     let (score, plan) = pool.best().expect("a plan was drawn").clone();
-    // Of plans that cost the same but for rounding the pool prefers the lower mean.
+    // Among plans that cost the same up to rounding, the pool prefers the lower mean.
     let is_optimal = lower_bound >= just_below(score.worst);
     let found = FoundPlan {
         is_optimal,
@@ -270,8 +273,8 @@ fn proven<'k>(
     Ok((found, key))
 }
 
-/// Fills `pool` with plans drawn at random and improved, from where `draws` ended; the least that was left where it stays
-/// empty.
+/// Fills `pool` with plans drawn at random and improved, continuing from the state `draws`. If the pool stays
+/// empty, returns the smallest set of pieces at which a draw got stuck.
 fn draw_plans(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -282,7 +285,7 @@ fn draw_plans(
     draws: &mut Draws,
 ) -> Result<Option<PieceSet>, Cancelled> {
     let mut stuck = space.all();
-    // A key that was not tried gets one batch whatever is left.
+    // A key not tried before gets one batch even if no tries or time are left.
     while may_find_more(params, space, pool, draws)
         && (draws.n_batches == 0 || (*tries_left > 0 && !ctx.is_time_up()))
     {
@@ -318,7 +321,7 @@ fn draw_plans(
     Ok((pool.len() == 0).then_some(stuck))
 }
 
-/// True where another batch of draws may add a plan to `pool` or find a better one.
+/// Returns true if another batch of draws may add a plan to `pool` or find a better one.
 fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Draws) -> bool {
     let is_hopeless = pool.len() == 0 && draws.n_batches >= MAX_EMPTY_BATCHES;
     let is_stale =
@@ -328,14 +331,14 @@ fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Dr
     !(draws.is_exhausted || is_hopeless || is_stale || is_done)
 }
 
-/// Improves the cheapest plans of a batch, then adds all to `pool`.
+/// Improves the cheapest plans of a batch, then adds all of them to `pool`.
 fn add_improved(
     space: &Space<'_>,
     key: &KeyChoice,
     mut plans: Vec<(PlanScore, LatticePlan)>,
     pool: &mut Pool,
 ) {
-    // The sort is stable: of equal plans the one drawn first wins.
+    // The sort is stable: among equal plans, the one drawn first wins.
     plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
     plans.dedup_by(|x, y| x.1 == y.1);
     let cheapest: Vec<&LatticePlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
@@ -351,7 +354,7 @@ fn add_improved(
         .for_each(|(score, plan)| pool.add(space, score, plan));
 }
 
-/// What plans may cost beyond those in the pool: nothing more than the best one, once there are enough.
+/// Cost bound for further plans: no bound until the pool is full, then the cost of the best plan.
 fn bound_of(pool: &Pool) -> f64 {
     if pool.len() < MOST_PLANS {
         f64::INFINITY
@@ -360,7 +363,7 @@ fn bound_of(pool: &Pool) -> f64 {
     }
 }
 
-/// The random stream of draw number `i`.
+/// Random stream of draw number `i`.
 pub(super) fn stream(seed: u64, i: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(FIRST_STREAM.wrapping_add(i as u64));
@@ -380,7 +383,7 @@ mod tests {
     use crate::ConnectorSizes;
     use crate::testing::{seams, sphere, voronoi};
 
-    /// The default costs with a counter of the questions.
+    /// The default costs with a counter of the calls.
     struct Counted {
         costs: SeamCosts,
         n_asked: Arc<AtomicUsize>,
@@ -393,7 +396,7 @@ mod tests {
         }
     }
 
-    /// Eight pieces of a ball, and parameters that draw too few plans to fill the pool.
+    /// Eight pieces of a ball, with parameters that draw too few plans to fill the pool.
     fn eight_pieces() -> (PlanSurvey, PlanParams) {
         let params = PlanParams {
             n_plans: 40,

@@ -1,4 +1,4 @@
-//! The search against brute force, on made-up and on real surfaces.
+//! Tests the search against brute force, on made-up and on real surfaces.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstrai
     on_ctx(|ctx| search(ctx, params, survey, constraints)).unwrap()
 }
 
-/// The plan found, `None` where there is none.
+/// The plan that the search finds; `None` if there is none.
 fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> Option<LatticePlan> {
     match searched(params, survey, constraints) {
         PlanOutcome::Found(found) => Some(found.plan),
@@ -44,8 +44,8 @@ fn surveyed(surface: &crate::SegmentedSurface) -> PlanSurvey {
     .unwrap()
 }
 
-/// A survey out of nothing: random contacts, joints, and few free directions; each contact holds each push by
-/// up to so much.
+/// A made-up survey: random contacts and joints, and few free directions. Each contact holds each push by at
+/// most a given amount.
 pub fn made_up(
     n: usize,
     edges: &[(u32, u32)],
@@ -102,7 +102,7 @@ fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
     }
 }
 
-/// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.
+/// Best cost of all allowed plans with a key among `keys`, by trying every order and direction.
 pub fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
     fn extend(space: &Space<'_>, removal: &mut Vec<LatticeStep>, keys: &[KeyChoice], best: &mut Option<f64>) {
         let left = removal
@@ -141,7 +141,7 @@ pub fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
     best
 }
 
-/// The choices as good as that which `plan` was made with.
+/// Key choices as good as the one of `plan`.
 fn equals_of(keys: &[KeyChoice], plan: &LatticePlan) -> Vec<KeyChoice> {
     let is_choice =
         |k: &&KeyChoice| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key()));
@@ -149,7 +149,7 @@ fn equals_of(keys: &[KeyChoice], plan: &LatticePlan) -> Vec<KeyChoice> {
     keys.iter().filter(|k| k.is_as_good_as(own)).cloned().collect()
 }
 
-/// The bound for plans with `keys` after so much work, and the plans found with each.
+/// Bound for plans with `keys` after `n_revisions` revisions, and the plans found with each key.
 fn proven(space: &Space<'_>, keys: &[KeyChoice], n_revisions: usize) -> (f64, Vec<Pool>) {
     let mut candidates: Vec<Candidate<'_>> = keys.iter().map(|k| Candidate::new(k, space.n)).collect();
     on_ctx(|ctx| prove(ctx, space, &mut candidates, &mut Budget::new(n_revisions))).unwrap();
@@ -236,7 +236,7 @@ fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
     assert_eq!(on(2), PlanOutcome::Found(found.clone()));
     let constraints = PlanConstraints::default();
     let space = Space::new(&survey, &constraints, 0.03);
-    // The pool: different plans, all allowed, best first, told with their costs.
+    // The pool holds different plans, all allowed, best first, with their costs.
     let relations: std::collections::BTreeSet<_> =
         found.pool.iter().map(|r| space.relations(&r.plan)).collect();
     assert_eq!(relations.len(), found.pool.len());
@@ -273,7 +273,7 @@ fn what_earlier_rounds_forbid_is_kept_to() {
             .insert((plan.steps[3].piece, plan.steps[3].separation));
         constraints.rejected.push(plan);
     }
-    // Contacts that hold nothing: with all of one piece's contacts weak, it hangs on nothing.
+    // If all contacts of one piece are weak, it joins nothing.
     survey
         .contacts
         .iter()
@@ -322,7 +322,7 @@ fn a_short_joint_counts_only_in_another_direction() {
 
 #[test]
 fn who_is_blocked_all_round_is_named_with_the_place() {
-    // A pea in its pod cannot be had with free paths: make every direction of every piece blocked.
+    // No simple shape blocks a piece all round, so every direction of every piece is marked as blocked.
     let mut survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 4, |p| {
         u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0)
     }));
@@ -449,7 +449,7 @@ fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
     }
 }
 
-/// The default costs as a metric would give them that knows bounds alone.
+/// The default costs through `bound` alone, as another metric would give them.
 pub struct BoundsAlone(pub SeamCosts);
 
 impl PieceCosts for BoundsAlone {
@@ -485,7 +485,7 @@ fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps
         .map(|survey| SeamCosts::new(survey, &PlanConstraints::default()));
     let (piece, n_seams) = (PatchId(0), 3);
     for round in 0..600 {
-        // Loosely held, and so well that the seams alone cost.
+        // The costs alternate between loosely held pieces and pieces held so well that only the seams cost.
         let costs = &costs[round % 2];
         let mut mask = || rng.random_range(1..=ALL_DIRECTIONS) & rng.random_range(1..=ALL_DIRECTIONS);
         let s = LatticeDirection::all()
@@ -517,7 +517,7 @@ fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps
             remaining: PieceSet::first(4),
         };
         let mut open = open;
-        // Where all other seams are decided, the limit leaves the last one no room at all.
+        // If all other seams are decided, the limit leaves the last one no room at all.
         (0..round % 4)
             .take(2)
             .for_each(|i| open.seams[i] = chosen.seams[i]);

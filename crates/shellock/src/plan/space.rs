@@ -1,4 +1,5 @@
-//! The plans that may be: a survey, seen with a tolerance and with what earlier rounds forbid, as bit sets.
+//! The space of possible plans: a survey under a tolerance and the constraints of earlier rounds, as bit
+//! sets.
 
 use super::cluster::{DirectedJoint, loose_part};
 use super::local_cost::{PieceCosts, Role, SeamCosts, SeamStates, Surroundings, mask_of};
@@ -6,35 +7,36 @@ use super::score::PlanScore;
 use super::{LatticePlan, LatticeStep, PieceSet, PlanConstraints, PlanSurvey};
 use crate::{LatticeDirection, PatchId};
 
-/// Per piece and direction.
+/// A table by piece and direction.
 type ByDirection<T> = Vec<[T; LatticeDirection::COUNT]>;
 
-/// How often a piece may rub against an earlier one before another order is asked for: the seam between the
-/// two is then at fault, not the direction.
+/// Number of times that a piece may rub against an earlier one before another order is required. By then the
+/// seam between the two is at fault, not the direction.
 pub(super) const MOST_RUBS: usize = 2;
 
-/// What the search asks, in bits. Holds at most [`PieceSet::MAX_PIECES`] pieces.
+/// Lookup tables of the search, as bits. Holds at most [`PieceSet::MAX_PIECES`] pieces.
 pub(super) struct Space<'a> {
     pub survey: &'a PlanSurvey,
     pub constraints: &'a PlanConstraints,
     pub n: usize,
-    /// Share of a piece that another may occlude.
+    /// Share of a piece that another may occlude while its path counts as free.
     pub tolerance: f64,
-    /// Who keeps a piece from leaving along a direction.
+    /// Pieces that keep a piece from leaving along a direction.
     blocks: ByDirection<PieceSet>,
-    /// Which earlier pieces a later one joins if it leaves along a direction.
+    /// Earlier pieces that a later piece joins if it leaves along a direction.
     joins: ByDirection<PieceSet>,
-    /// Pairs that can join in some order along some direction.
+    /// For each piece, those that it can join in some order along some direction.
     pub neighbours: Vec<PieceSet>,
-    /// Contacts of each piece, as positions in the survey's list.
+    /// Contacts of each piece, as indices into the survey's list.
     pub contacts_of: Vec<Vec<usize>>,
-    /// What pieces cost.
+    /// Cost function of the pieces.
     pub costs: Box<dyn PieceCosts>,
 }
 
-/// What tells plans apart: directions of all pieces but the first, and which piece of each contact is later.
+/// Distinguishing features of a plan: directions of all pieces but the first, and the later piece of each
+/// contact.
 ///
-/// Plans that agree in both make the same joints, whatever the order of pieces that do not touch.
+/// Plans with equal relations make the same joints, whatever the order of pieces that do not touch.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Relations {
     separations: Vec<Option<LatticeDirection>>,
@@ -42,7 +44,7 @@ pub(super) struct Relations {
 }
 
 impl<'a> Space<'a> {
-    /// The space with the default costs.
+    /// Creates the space with the default costs.
     pub fn new(survey: &'a PlanSurvey, constraints: &'a PlanConstraints, tolerance: f64) -> Self {
         Self::with_costs(
             survey,
@@ -107,18 +109,18 @@ impl<'a> Space<'a> {
         PieceSet::first(self.n)
     }
 
-    /// Whether `p` may leave `rest` along `s`.
+    /// Returns true if `p` may leave `rest` along `s`.
     pub fn is_free(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> bool {
         self.blocks[usize::from(p)][s.index()].and(rest).is_empty()
             && !self.constraints.forbidden.contains(&(p, s))
     }
 
-    /// The pieces of `rest` that `p` joins if it leaves them along `s`.
+    /// Pieces of `rest` that `p` joins if it leaves them along `s`.
     pub fn joined(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> PieceSet {
         self.joins[usize::from(p)][s.index()].and(rest)
     }
 
-    /// The joints of `p`, installed after all of `rest`.
+    /// Joints of `p` when installed after all of `rest`.
     pub fn joints(
         &self,
         p: PatchId,
@@ -132,8 +134,9 @@ impl<'a> Space<'a> {
         })
     }
 
-    /// Whether `plan` keeps every condition: paths free, each piece joined to an earlier and a later one,
-    /// what is still to be installed connected, locked, and not rejected before.
+    /// Returns true if `plan` satisfies every condition: paths are free; each piece joins an earlier and a
+    /// later one; the pieces still in place stay connected; the assembly locks; and the plan was not rejected
+    /// before.
     pub fn allows(&self, plan: &LatticePlan) -> bool {
         let mut rest = self.all();
         let mut attached = PieceSet::one(plan.key());
@@ -156,13 +159,13 @@ impl<'a> Space<'a> {
         loose_part(self.n, &joints, plan.key()).is_none() && !self.is_rejected(plan)
     }
 
-    /// Whether an earlier round turned down a plan with the same relations.
+    /// Returns true if an earlier round rejected a plan with the same relations.
     pub fn is_rejected(&self, plan: &LatticePlan) -> bool {
         let is_same = |r: &LatticePlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
         self.constraints.rejected.iter().any(is_same)
     }
 
-    /// What tells `plan` from others.
+    /// Relations that distinguish `plan` from others.
     pub fn relations(&self, plan: &LatticePlan) -> Relations {
         let mut position = vec![0; self.n];
         let mut separations = vec![None; self.n];
@@ -182,7 +185,7 @@ impl<'a> Space<'a> {
         }
     }
 
-    /// Costs of `plan`; lower is better.
+    /// Costs of `plan` and of its pieces; lower is better.
     pub fn score(&self, plan: &LatticePlan) -> PlanScore {
         let around = self.surroundings(plan);
         let cost =
@@ -190,7 +193,7 @@ impl<'a> Space<'a> {
         PlanScore::of(around.iter().enumerate().map(cost).collect())
     }
 
-    /// Pieces of `plan` that hardly anything holds.
+    /// Pieces of `plan` that are held by too little, see [`PieceCosts::is_loose`].
     pub fn loose(&self, plan: &LatticePlan) -> Vec<PatchId> {
         let around = self.surroundings(plan);
         let is_loose = |p: &PatchId| {
@@ -200,7 +203,7 @@ impl<'a> Space<'a> {
         (0..self.n).map(PatchId::from).filter(is_loose).collect()
     }
 
-    /// Pieces of `plan` that are not held firmly.
+    /// Pieces of `plan` that are not held firmly, see [`PieceCosts::is_firm`].
     pub fn infirm(&self, plan: &LatticePlan) -> Vec<PatchId> {
         let around = self.surroundings(plan);
         let is_firm = |p: &PatchId| {
@@ -223,8 +226,8 @@ impl<'a> Space<'a> {
         found
     }
 
-    /// Role and surroundings of the piece of `step` that leaves `rest`; `separations` of those that left
-    /// before.
+    /// Role and surroundings of the piece of `step` as it leaves `rest`. `separations` are the directions of
+    /// the pieces removed before.
     pub fn leaving(
         &self,
         step: LatticeStep,
@@ -260,7 +263,7 @@ impl<'a> Space<'a> {
         )
     }
 
-    /// Directions that `p` may ever take, as bits.
+    /// Directions that the constraints ever allow `p`, as bits.
     pub fn allowed(&self, p: PatchId) -> u32 {
         let is_allowed = |s: &LatticeDirection| !self.constraints.forbidden.contains(&(p, *s));
         LatticeDirection::all()
@@ -268,12 +271,13 @@ impl<'a> Space<'a> {
             .fold(0, |mask, s| mask | mask_of(s))
     }
 
-    /// Who keeps `p` from leaving along `s` by staying.
+    /// Pieces that keep `p` from leaving along `s` as long as they are in place.
     pub fn blockers(&self, p: PatchId, s: LatticeDirection) -> PieceSet {
         self.blocks[usize::from(p)][s.index()]
     }
 
-    /// Pieces whose removal would part the others; all plans fail where there is one.
+    /// Articulation pieces, without which the others would be disconnected. If there is one, every plan
+    /// fails.
     pub fn articulations(&self) -> Vec<PatchId> {
         let parts = |p: &PatchId| !self.all().minus(PieceSet::one(*p)).is_connected(&self.neighbours);
         (0..self.n).map(PatchId::from).filter(parts).collect()

@@ -1,4 +1,4 @@
-//! How fast the randomised search gets better, with and without its two techniques (Fig. 14).
+//! Convergence of the randomised search, with and without its two techniques (Fig. 14).
 
 use rayon::prelude::*;
 
@@ -11,24 +11,24 @@ use super::space::Space;
 use super::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey};
 use crate::{Cancelled, Ctx};
 
-/// Draws between two looks at the best cost: the bound is that of the draws before.
+/// Draws between two updates of the best cost. The bound of a batch is the best cost of the batches before.
 const BATCH: usize = 8;
 
-/// Which techniques the search uses beside connectivity, free paths and the cluster test.
+/// Techniques of the search, beside connectivity, free paths and the cluster test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Technique {
-    /// Neither.
+    /// Neither of the two techniques.
     Random,
-    /// Pieces that cost more than the worst piece of the best plan are pruned.
+    /// Prunes pieces that cost more than the worst piece of the best plan.
     Pruning,
-    /// Each plan drawn is improved locally.
+    /// Improves each drawn plan locally.
     LocalOptimisation,
-    /// Both.
+    /// Both pruning and local optimisation.
     Both,
 }
 
 impl Technique {
-    /// All four.
+    /// All four combinations of techniques.
     pub const ALL: [Self; 4] = [Self::Random, Self::Pruning, Self::LocalOptimisation, Self::Both];
 
     fn prunes(self) -> bool {
@@ -40,22 +40,22 @@ impl Technique {
     }
 }
 
-/// The best cost after so much work.
+/// Best cost after a given amount of work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Costs of pieces that draws asked for, plus plans that local optimisation looked at.
+    /// Number of piece costs that draws evaluated, plus number of plans that local optimisation evaluated.
     pub n_evaluations: usize,
-    /// Plans drawn.
+    /// Number of plans drawn.
     pub n_plans: usize,
     /// Cost of the best plan's worst piece.
     pub best_cost: f64,
 }
 
-/// The best cost of plans with the first key that has any, each time it falls and at the end of
-/// `n_evaluations`.
+/// Convergence curve of the first key that has any plan: one sample each time the best cost falls, and one at
+/// the end of `n_evaluations`.
 ///
-/// All draws are alike here (none greedy), so the curves show what the techniques do. Empty where no key has
-/// a plan. The same for a seed on any number of threads.
+/// All draws are alike here (none is greedy), so the curves show the effect of the techniques. Empty if no
+/// key has a plan. One seed gives one curve on any number of threads.
 pub fn convergence(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -115,13 +115,13 @@ pub fn convergence(
     Ok(Vec::new())
 }
 
-/// Batches without any plan after which a key is given up.
+/// Batches without any plan after which a key is abandoned.
 const MOST_EMPTY_BATCHES: usize = 8;
 
-/// Index of draws whose order of candidates is uniform.
+/// Index of the spread with a uniform order of candidates.
 const UNIFORM: usize = 3;
 
-/// What became of a plan, and how many plans were looked at for it.
+/// Score of a plan after local optimisation, if any, and number of plans evaluated for it.
 fn finished(
     space: &Space<'_>,
     key: &super::key::KeyChoice,

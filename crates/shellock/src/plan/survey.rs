@@ -1,4 +1,4 @@
-//! What planning needs to know of the surface, measured once: later rounds only change the constraints.
+//! Measurements of the surface for planning, made once. Later rounds change only the constraints.
 
 use shellock_geom::Vec3;
 
@@ -8,27 +8,27 @@ use super::occlusion::Occlusion;
 use super::{PieceSet, PlanParams};
 use crate::{Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, Seam, SegmentedSurface};
 
-/// Everything that [`search`](super::search) reads of the surface.
+/// All data of the surface that [`search`](super::search) reads.
 #[derive(Clone, Debug)]
 pub struct PlanSurvey {
-    /// How many pieces there are.
+    /// Number of pieces, also if they are too many to measure.
     pub n_pieces: usize,
-    /// Who is in whose way.
+    /// Occlusion of each piece by every other.
     pub occlusion: Occlusion,
     /// Pairs that share a seam, sorted.
     pub contacts: Vec<Interface>,
-    /// Mean outward normal of each piece, by area: length in [0, 1], near 1 where the piece is flat.
+    /// Mean outward normal of each piece, weighted by area. Its length is in [0, 1], near 1 for a flat piece.
     pub mean_normal: IdVec<PatchId, Vec3>,
     /// Area of each piece, mm².
     pub area_mm2: IdVec<PatchId, f64>,
     /// The plane nearest to each piece.
     pub flatness: IdVec<PatchId, Flatness>,
-    /// The floor β that the contacts were weighed with.
+    /// Floor β used in the weights of the contacts.
     pub beta: f64,
 }
 
-/// Measures `surface`, to be joined by connectors of `sizes`. With more than [`PieceSet::MAX_PIECES`] pieces
-/// only their number, which the search refuses.
+/// Measures `surface`, to be joined by connectors of `sizes`. With more than [`PieceSet::MAX_PIECES`] pieces,
+/// records only their number, which the search refuses.
 pub fn survey(
     ctx: &Ctx<'_>,
     params: &PlanParams,

@@ -1,4 +1,4 @@
-//! What a plan is, and what keeps one from being found.
+//! Plans, the constraints on them, and the reasons why none is found.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,28 +9,29 @@ use super::space::MOST_RUBS;
 use super::{PlanScore, PlanSurvey};
 use crate::{IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
 
-/// A plan whose directions are of the 26: what the search finds and pieces are made by.
+/// A plan whose directions are among the 26 lattice directions. The search finds such plans, and pieces are
+/// made by them.
 pub type LatticePlan = InstallationPlan<LatticeDirection>;
-/// A step of it.
+/// One step of a lattice plan.
 pub type LatticeStep = InstallationStep<LatticeDirection>;
 
-/// What earlier rounds taught: the search must respect all of it.
+/// Lessons of earlier rounds, all of which the search must respect.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlanConstraints {
-    /// A later piece, an earlier one and the direction of the later one with which their connectors came out
-    /// too small to hold: they touch, but join nothing. Along other directions they may.
+    /// (later piece, earlier piece, separation direction of the later one) whose connectors came out too
+    /// small to hold. Such a pair touches but joins nothing. Along other directions it may join.
     pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
-    /// Directions that a piece must not take, because its path rubbed.
+    /// Directions that a piece must not take because it rubbed on its way.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
-    /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before
-    /// it.
+    /// Number of times that a piece (first) rubbed against an earlier one (second). After two, along two
+    /// directions, the first piece must be installed before the second.
     pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
-    /// Whole plans that failed for a reason that none of the above says.
+    /// Whole plans that failed for a reason not covered by the fields above.
     pub rejected: Vec<LatticePlan>,
 }
 
 impl PlanConstraints {
-    /// How many things there are that restrict plans.
+    /// Number of lessons that restrict plans.
     pub fn n_lessons(&self) -> usize {
         let Self {
             weak_joints,
@@ -42,14 +43,14 @@ impl PlanConstraints {
         weak_joints.len() + forbidden.len() + n_orders + rejected.len()
     }
 
-    /// The two join nothing any more, whatever goes in later and along which direction.
+    /// Marks that `a` and `b` join nothing, whichever is later and along any direction.
     #[cfg(test)]
     pub fn weaken(&mut self, a: PatchId, b: PatchId) {
         self.weak_joints
             .extend(LatticeDirection::all().flat_map(|s| [(a, b, s), (b, a, s)]));
     }
 
-    /// Whether nothing joins the two where `later` leaves along `s`.
+    /// Returns true if nothing joins the two when `later` leaves along `s`.
     pub fn is_weak(&self, later: PatchId, earlier: PatchId, s: LatticeDirection) -> bool {
         self.weak_joints.contains(&(later, earlier, s))
     }
@@ -62,85 +63,85 @@ pub struct Blocker {
     pub piece: PatchId,
     /// The piece in its way.
     pub by: PatchId,
-    /// Where, mm in assembly space.
+    /// Place of the obstruction, mm in assembly space.
     pub at: [f64; 3],
     /// Share of `piece` that `by` occludes along the best direction, in [0, 1].
     pub occluded: f64,
 }
 
-/// A plan and what it costs.
+/// A plan with its cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankedPlan {
-    /// The plan.
+    /// Plan that was ranked.
     pub plan: LatticePlan,
-    /// Its cost, which is that of its worst piece, and the cost of every piece.
+    /// Cost of the plan, which is that of its worst piece, and cost of every piece.
     pub score: PlanScore,
-    /// Pieces that are held by less than the verification asks for, by estimate.
+    /// Pieces held by less than the verification requires, by estimate.
     pub loose: Vec<PatchId>,
 }
 
-/// The best plan found, and how good any other with a key as good as its own can be.
+/// The best plan found, with bounds on how good any other plan with an equally good key can be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundPlan {
-    /// The best plan.
+    /// Best plan that was found.
     pub plan: LatticePlan,
-    /// Its cost, which is that of its worst piece, and the cost of every piece.
+    /// Cost of the plan, which is that of its worst piece, and cost of every piece.
     pub score: PlanScore,
-    /// Proven: no allowed plan within `scope` costs less.
+    /// Proven lower bound: no allowed plan within `scope` costs less.
     pub lower_bound: f64,
-    /// The same for plans within `scope` that have this plan's key: at least as much, since one key is less
-    /// to search.
+    /// Proven lower bound for plans within `scope` that have this plan's key. At least `lower_bound`, since a
+    /// single key leaves fewer plans.
     pub key_lower_bound: f64,
-    /// Whether the plan's own cost was proven to be the least within `scope`.
+    /// True if the cost of `plan` is proven to be the least within `scope`.
     pub is_optimal: bool,
-    /// For which plans that holds.
+    /// Plans for which the bounds hold.
     pub scope: ProofScope,
-    /// Share of a piece that others may occlude, under which it was found.
+    /// Share of a piece that others may occlude, as used in the search for this plan.
     pub tolerance: f64,
-    /// Runs of this many connector sizes counted as joints.
+    /// Shortest run that counted as a joint, in connector sizes.
     pub run_sizes: f64,
-    /// Up to 100 plans with the same key and different relations between pieces: `plan`, then the others,
-    /// cheapest first.
+    /// Up to 100 plans with the same key and different relations between pieces: first `plan`, then the
+    /// others, cheapest first.
     pub pool: Vec<RankedPlan>,
 }
 
-/// The plans for which a lower bound holds; about all others it says nothing.
+/// The plans for which a lower bound holds. The bound says nothing about any other plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProofScope {
-    /// Pieces that may be the key: as flat as the plan's own, or as curved; the one that is liked best first.
+    /// Pieces that may be the key, most preferred first. All are flat or all are curved, as the plan's own
+    /// key is.
     pub keys: Vec<PatchId>,
-    /// How the key slides out.
+    /// Kind of direction along which the key slides out.
     #[serde(rename = "key_slides")]
     pub slides: KeyDirections,
-    /// Lessons of failed kits that plans must respect; 0 where nothing but the model restricts them.
+    /// Number of lessons of failed kits that plans must respect; 0 if nothing but the model restricts them.
     #[serde(rename = "lessons")]
     pub n_lessons: usize,
 }
 
-/// What is known of how good a plan is.
+/// Cost of a plan with its proven bounds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanProof {
     /// Cost of the plan's worst piece.
     pub cost: f64,
-    /// See [`FoundPlan::lower_bound`].
+    /// Proven lower bound, see [`FoundPlan::lower_bound`].
     pub lower_bound: f64,
-    /// How much cheaper another plan may be, as share of the cost, in [0, 1].
+    /// Greatest possible saving by another plan, as a share of the cost, in [0, 1].
     pub gap: f64,
-    /// Whether the cost was proven to be the least.
+    /// True if the cost is proven to be the least.
     pub optimal: bool,
-    /// Cost of the cheapest plan that is known; less than `cost` where a plan that costs a little more was
-    /// chosen.
+    /// Cost of the cheapest known plan. Less than `cost` if a slightly costlier plan was chosen.
     pub least_cost: f64,
-    /// See [`FoundPlan::key_lower_bound`].
+    /// Lower bound with this key, see [`FoundPlan::key_lower_bound`].
     pub key_lower_bound: f64,
-    /// For which plans the bound holds.
+    /// Plans for which the bound holds.
     pub proven_for: ProofScope,
     /// Cost of each piece.
     pub piece_costs: IdVec<PatchId, f64>,
 }
 
 impl FoundPlan {
-    /// The survey with joints counted as when the plan was found.
+    /// Returns a copy of `survey` in which joints count as they did when the plan was found.
     pub fn counted(&self, survey: &PlanSurvey) -> PlanSurvey {
         let mut counted = survey.clone();
         counted
@@ -150,7 +151,7 @@ impl FoundPlan {
         counted
     }
 
-    /// The figures alone.
+    /// Returns the figures of the proof without the plans.
     pub fn proof(&self) -> PlanProof {
         let (cost, lower_bound) = (self.score.worst, self.lower_bound);
         let (proven_for, piece_costs) = (self.scope.clone(), self.score.pieces.clone());
@@ -167,7 +168,8 @@ impl FoundPlan {
         }
     }
 
-    /// How much cheaper another plan may be, as share of this one's cost, in [0, 1].
+    /// Greatest possible saving by another plan, as a share of this plan's cost, in [0, 1]; 0 if the plan
+    /// costs nothing.
     pub fn gap(&self) -> f64 {
         if self.score.worst > 0.0 {
             1.0 - self.lower_bound / self.score.worst
@@ -177,18 +179,18 @@ impl FoundPlan {
     }
 }
 
-/// The answer of the search. Both are results, not errors.
+/// Answer of the search. Both variants are results, not errors.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlanOutcome {
-    /// A plan that keeps every condition.
+    /// A plan that satisfies every condition.
     Found(Box<FoundPlan>),
-    /// None was found.
+    /// No plan was found.
     Infeasible {
-        /// Why, for people.
+        /// Reason, as a message for people.
         reason: String,
-        /// Who is in whose way; empty where paths are free but no plan locks.
+        /// Pieces in each other's way; empty if paths are free but no plan locks.
         blockers: Vec<Blocker>,
-        /// Articulation pieces of the contact graph: splitting one of them may help.
+        /// Articulation pieces of the contact graph. Splitting one of them may help.
         articulations: Vec<PatchId>,
     },
 }

@@ -1,4 +1,4 @@
-//! What became of the user's labels, told of the surface that is kept.
+//! Changes to the user's labels, reported for the final surface.
 
 use shellock_geom::Solid;
 
@@ -6,21 +6,21 @@ use super::keep_whole::{place_in, tell_cut};
 use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, resolved, user_labels};
 use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning};
 
-/// A label lies in a piece, or a piece in a label, with more than this share of its area; smoothing moves
+/// Least share of area for a label to lie mainly in a piece, or a piece mainly in a label. Smoothing moves
 /// less.
 const MAIN_SHARE: f64 = 0.5;
 
-/// Which labels lie in which pieces.
+/// Correspondence of labels and pieces.
 pub(super) struct Changes {
-    /// For each label the pieces that are mainly its own.
+    /// For each label, the pieces that belong mainly to it.
     pieces_of: Vec<Vec<PatchId>>,
-    /// For each piece the labels that lie mainly in it, and the one that it lies mainly in.
+    /// For each piece, the labels that lie mainly in it, and the one in which it mainly lies.
     labels_of: Vec<Vec<usize>>,
 }
 
 impl Changes {
-    /// From `labels` of a mesh to the pieces of `surface`, whose triangles name those of the mesh as their
-    /// sources.
+    /// Compares `labels` of a mesh with the pieces of `surface`, whose source triangles are those of the
+    /// mesh.
     pub fn between(labels: &FaceLabels, surface: &SegmentedSurface) -> Self {
         let (n_labels, n_pieces) = (labels.n_patches(), surface.n_patches);
         let mut common = vec![vec![0.0; n_pieces]; n_labels];
@@ -51,7 +51,7 @@ impl Changes {
         }
     }
 
-    /// How many labels share a piece with another and gave it their name.
+    /// Number of labels that lost their own piece to another label with which they share it.
     pub fn n_lost(&self) -> usize {
         self.labels_of
             .iter()
@@ -61,8 +61,9 @@ impl Changes {
 }
 
 /// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]),
-/// divided (`piece-split`) or joined (`piece-joined`), regions to keep whole that are not (`keep-whole-cut`),
-/// contacts shorter than wanted (`short-contacts`) and pieces that still hold others alone (`weak-graph`).
+/// divided (`piece-split`) or joined (`piece-joined`); regions to keep whole that were cut
+/// (`keep-whole-cut`); contacts shorter than wanted (`short-contacts`); and pieces that are still the only
+/// link to others (`weak-graph`).
 pub fn tell(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -86,7 +87,7 @@ pub fn tell(
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
     if graph.n_faults() > 0 {
         let pieces = graph.articulation_pieces();
-        // What is kept whole may be why it could not be mended.
+        // A region to keep whole may be the reason why the fault remained.
         let at = place_in(&keep, surface, &pieces);
         ctx.warn(Warning {
             cause: Cause::WeakGraph,
@@ -97,7 +98,7 @@ pub fn tell(
     Ok(())
 }
 
-/// The user's name for each patch: the label of most of its area.
+/// User's name of each patch: the label of most of its area.
 fn names(solid: &Solid, given: &[i64], cleaned: &FaceLabels) -> Vec<i64> {
     let mut area = vec![std::collections::BTreeMap::<i64, f64>::new(); cleaned.n_patches()];
     for (face, label) in given.iter().enumerate() {
@@ -147,7 +148,7 @@ fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedS
     }
 }
 
-/// Which seams are shorter than wanted but had to count.
+/// Warns of seams that are shorter than wanted but had to count as contacts.
 fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface, limit_mm: f64) {
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
     let short: Vec<_> = graph
@@ -168,7 +169,7 @@ fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface
     });
 }
 
-/// The middle of a triangle of `piece`, mm.
+/// Middle of some triangle of `piece`, mm.
 fn middle(surface: &SegmentedSurface, piece: PatchId) -> Option<[f64; 3]> {
     let face = surface.patch_of_face.iter().position(|&p| p == piece)?;
     Some(surface.mesh.face_center(face).to_array())

@@ -1,9 +1,9 @@
-//! Patches of similar size without a user: k-means on the surface.
+//! Patches of similar size without a user's labels: k-means on the surface.
 //!
-//! Triangles are first merged into a few thousand cells; seeds are spread over the cells, patches grow from
-//! them in the geodesic metric with creases, and each seed moves to the middle of its patch, as in Lloyd's
-//! algorithm. Patches that stay too large grow slower in the next round. In the end the triangles themselves
-//! are won from the final seeds.
+//! Triangles are first merged into a few thousand cells, and seeds are spread over the cells. Patches grow
+//! from the seeds in a geodesic metric that counts creases. Each seed moves to the middle of its patch, as in
+//! Lloyd's algorithm. Patches that stay too large grow more slowly in the next round. Finally, patches of
+//! triangles grow from the final seeds.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ use super::dual_graph::{CreaseCost, DualGraph};
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::Ctx;
 
-/// Cells the clustering works on: with 10 patches, 400 a patch place a seed to 3 % of the patch's width.
+/// Number of cells to cluster. With 10 patches, 400 cells for each place a seed to 3 % of the patch's width.
 const N_CELLS: usize = 4000;
 /// Rounds of growing and centring; the seeds rarely move after ten.
 const N_ROUNDS: usize = 12;
@@ -22,18 +22,18 @@ const N_ROUNDS: usize = 12;
 const N_STARTS: u64 = 4;
 /// Candidates for the middle of a patch, besides its present seed.
 const N_CANDIDATES: usize = 8;
-/// Detour for one radian of concave and of convex crease, in radii of a patch.
+/// Detours for one radian of concave and of convex crease, in radii of a patch.
 const CONCAVE_RADII: f64 = 0.3;
 const CONVEX_RADII: f64 = 0.04;
 
-/// A seed's node and the slowness of its patch.
+/// Node of a seed and slowness of its patch.
 type Seed = (u32, f64);
 
-/// About `n_pieces` connected patches of similar area, seams rather in concave creases; the same for the same
-/// seed.
+/// Divides into about `n_pieces` connected patches of similar area, with seams preferably in concave creases.
+/// One seed gives one result.
 ///
-/// Each patch is connected; disks only after [`super::refine`]. Fails where the model has fewer triangles than
-/// patches are wanted; 0.2 s for 60 000 triangles.
+/// Patches are connected, but disks only after [`super::refine`]. Fails if the model has fewer triangles than
+/// patches wanted. Takes 0.2 s for 60 000 triangles.
 pub(super) fn crease_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -80,14 +80,14 @@ pub(super) fn crease_labels(
         .map(|&(c, slowness)| (face_of_cell[c as usize].1, slowness))
         .collect();
     let (_, mut owner) = faces.grow(&face_seeds, |_| true);
-    // Only bodies without a seed stay unreached: they go to the first patch, and the labels' check splits
+    // Only bodies without a seed stay unreached. They go to the first patch, and the labels' check splits
     // them off again.
     owner.iter_mut().filter(|o| **o == u32::MAX).for_each(|o| *o = 0);
     Ok(FaceLabels::from_connected(&topology, &owner))
 }
 
-/// How many pieces a surface of `area_mm2` gets: 10 for a 150 mm figure, as the paper's 9 to 13, growing as
-/// the figure's height does to the power of two thirds.
+/// Default number of pieces for a surface of `area_mm2`, in [6, 24]: 10 for a 150 mm figure, as the paper's 9
+/// to 13. It grows with the figure's height to the power of two thirds.
 pub(crate) fn usual_n_pieces(area_mm2: f64) -> usize {
     (10.0 * (area_mm2 / 45_000.0).cbrt()).round().clamp(6.0, 24.0) as usize
 }
@@ -133,7 +133,8 @@ fn cells(mesh: &TriMesh, topology: &Topology, n_wanted: usize) -> (Vec<u32>, usi
     (cell, n_cells as usize)
 }
 
-/// One run of k-means and its badness: mean squared distance from the seeds, raised where areas differ.
+/// Runs k-means once. Returns its badness with the seeds: the mean squared distance from the seeds, raised if
+/// areas differ.
 fn cluster(graph: &DualGraph, n_pieces: usize, mut rng: impl Rng) -> (f64, Vec<Seed>) {
     let n_pieces = n_pieces.min(graph.len());
     let mut seeds = spread(graph, n_pieces, &mut rng);
@@ -166,8 +167,8 @@ fn cluster(graph: &DualGraph, n_pieces: usize, mut rng: impl Rng) -> (f64, Vec<S
     best
 }
 
-/// `n` nodes far from each other: each next one drawn by area times the fourth power of its distance from
-/// those before.
+/// Draws `n` nodes far from each other, each by area times the fourth power of its distance from those
+/// before.
 fn spread(graph: &DualGraph, n: usize, rng: &mut impl Rng) -> Vec<Seed> {
     let mut seeds = vec![(draw(&graph.area, rng), 1.0)];
     while seeds.len() < n {
@@ -185,7 +186,7 @@ fn spread(graph: &DualGraph, n: usize, rng: &mut impl Rng) -> Vec<Seed> {
     seeds
 }
 
-/// An index drawn with probability proportional to `weight`.
+/// Draws an index with probability proportional to `weight`.
 fn draw(weight: &[f64], rng: &mut impl Rng) -> u32 {
     let mut left = rng.random::<f64>() * weight.iter().sum::<f64>();
     for (i, w) in weight.iter().enumerate() {
@@ -197,8 +198,7 @@ fn draw(weight: &[f64], rng: &mut impl Rng) -> u32 {
     weight.len() as u32 - 1
 }
 
-/// The one among the present seed and some members that is nearest to all members: least sum of squared
-/// distances.
+/// Node nearest to all members, by least sum of squared distances, among the present seed and some members.
 fn middle(graph: &DualGraph, members: &[u32], seed: u32, owner: &[u32], k: u32, rng: &mut impl Rng) -> u32 {
     if members.is_empty() {
         return seed;

@@ -14,22 +14,22 @@ use shellock_geom::{Solid, Topology, TriMesh, Vec3};
 
 /// Least distance of a cut from an edge's ends, in edge lengths.
 ///
-/// Nearer ties are moved here: it shifts a seam by a fiftieth of an edge at most, keeps slivers measurable,
-/// and every triangle keeps its combinatorial case, so that the result is closed and patches stay connected
-/// by construction.
+/// Ties nearer to an end are moved here. This shifts a seam by a fiftieth of an edge at most and keeps
+/// slivers measurable. Every triangle keeps its combinatorial case, so the result is closed and patches stay
+/// connected by construction.
 const MIN_CUT: f64 = 0.02;
 /// Least barycentric coordinate of a triple point, for the same reason.
 const MIN_INSIDE: f64 = 0.05;
 const NO_POINT: u32 = u32::MAX;
 
-/// A mesh with one owner a triangle.
+/// A mesh with one owner for each triangle.
 pub(super) struct Cut {
     pub mesh: TriMesh,
     pub owner: Vec<u32>,
     pub source_face: Vec<u32>,
 }
 
-/// Cuts between points of different `owner`, where linear interpolation of their `soft` labels ties.
+/// Cuts between points of different `owner`, at the tie of their linearly interpolated `soft` labels.
 pub(super) fn cut_along_ties(solid: &Solid, soft: &[f64], owner: &[u32]) -> Cut {
     let (mesh, topology) = (solid.mesh(), Topology::new(solid));
     let n_points = mesh.points.len();
@@ -78,8 +78,8 @@ pub(super) fn cut_along_ties(solid: &Solid, soft: &[f64], owner: &[u32]) -> Cut 
     cut
 }
 
-/// Barycentric coordinates of the point where two linear functions, given by their values at the corners,
-/// vanish; the middle where that is not well inside.
+/// Barycentric coordinates of the common zero of two linear functions, given by their values at the corners;
+/// the middle if that zero is not well inside.
 fn triple_point(lead_1: Vec3, lead_2: Vec3) -> Vec3 {
     let w = lead_1.cross(lead_2);
     let w = w / w.element_sum();
@@ -97,7 +97,7 @@ impl Cut {
         self.source_face.push(face as u32);
     }
 
-    /// One corner has another owner than the two others.
+    /// Cuts a triangle with one corner whose owner differs from that of the two others.
     fn cut_in_two(&mut self, face: usize, t: [u32; 3], k: [u32; 3], x: [u32; 3]) {
         // The lone corner a lies across the edge without a tie.
         let lone = (0..3)
@@ -118,7 +118,8 @@ impl Cut {
         }
     }
 
-    /// All corners have different owners; `inside` are the barycentric coordinates of the triple point.
+    /// Cuts a triangle whose corners all have different owners; `inside` are the barycentric coordinates of
+    /// the triple point.
     fn cut_in_three(&mut self, face: usize, t: [u32; 3], k: [u32; 3], x: [u32; 3], inside: Vec3) {
         let [p, q, r] = t.map(|v| self.mesh.points[v as usize]);
         let middle = self.mesh.points.len() as u32;

@@ -1,12 +1,12 @@
-//! Triangles, or cells of many triangles, as nodes of a graph whose paths are the geodesics that patches grow
-//! along.
+//! Dual graph of triangles, or of cells of many triangles. Its shortest paths are the geodesics along which
+//! patches grow.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use shellock_geom::{Topology, TriMesh, Vec3};
 
-/// Undirected weighted graph in compressed rows; lengths in mm.
+/// An undirected weighted graph in compressed rows; lengths in mm.
 pub(crate) struct DualGraph {
     start: Vec<u32>,
     arcs: Vec<(u32, f64)>,
@@ -16,8 +16,8 @@ pub(crate) struct DualGraph {
     pub area: Vec<f64>,
 }
 
-/// What crossing a crease costs, in mm of detour a radian of turning: seams then rather lie in creases than
-/// patches reach over them.
+/// Cost of crossing a crease, in mm of detour for each radian of turning. It makes seams lie in creases
+/// rather than patches reach over them.
 ///
 /// The turning is not squared, so the cost of a fold does not depend on how finely it is triangulated.
 #[derive(Clone, Copy)]
@@ -27,7 +27,7 @@ pub(crate) struct CreaseCost {
 }
 
 impl CreaseCost {
-    /// Distances only.
+    /// Zero cost of creases: only distances count.
     pub const NONE: Self = Self {
         concave_mm: 0.0,
         convex_mm: 0.0,
@@ -47,13 +47,13 @@ impl CreaseCost {
 }
 
 impl DualGraph {
-    /// One node for each triangle.
+    /// Builds the graph with one node for each triangle.
     pub fn of_faces(mesh: &TriMesh, topology: &Topology, cost: CreaseCost) -> Self {
         let cell: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         Self::of_cells(mesh, topology, &cell, cell.len(), cost)
     }
 
-    /// One node for each of `n_cells` connected sets of triangles.
+    /// Builds the graph with one node for each of `n_cells` connected sets of triangles.
     pub fn of_cells(
         mesh: &TriMesh,
         topology: &Topology,
@@ -109,26 +109,26 @@ impl DualGraph {
         }
     }
 
-    /// How many nodes there are.
+    /// Number of nodes in the graph.
     pub fn len(&self) -> usize {
         self.area.len()
     }
 
-    /// The nodes beside `node` and the lengths of the ways there, mm.
+    /// Neighbours of `node`, with the lengths of the arcs to them, mm.
     pub fn arcs(&self, node: u32) -> &[(u32, f64)] {
         &self.arcs[self.start[node as usize] as usize..self.start[node as usize + 1] as usize]
     }
 
-    /// Distance from the nearest source and that source's index, for each node that can be reached through
+    /// Distance from the nearest source and that source's index, for each node that is reachable through
     /// `allowed` nodes.
     ///
-    /// Distances from source i are multiplied by `sources[i].1` > 0. What a source wins is connected, as a
-    /// front only advances through nodes it has won. Unreached nodes have infinite distance and index
-    /// `u32::MAX`.
+    /// Distances from source i are multiplied by `sources[i].1` > 0. The nodes that a source wins are
+    /// connected, as a front only advances through nodes it has won. Unreached nodes have infinite distance
+    /// and index `u32::MAX`.
     pub fn grow(&self, sources: &[(u32, f64)], allowed: impl Fn(u32) -> bool) -> (Vec<f64>, Vec<u32>) {
         let mut distance = vec![f64::INFINITY; self.len()];
         let mut owner = vec![u32::MAX; self.len()];
-        // Non-negative floats order like their bits; node and owner break ties the same way on every run.
+        // Non-negative floats order like their bits. Node and owner break ties the same way on every run.
         let mut front = BinaryHeap::new();
         for (i, &(node, _)) in sources.iter().enumerate() {
             if owner[node as usize] == u32::MAX {

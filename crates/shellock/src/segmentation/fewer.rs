@@ -1,9 +1,9 @@
 //! Divisions with fewer parts, for kits.
 //!
-//! What a person would draw is seldom what locks: a ring around a limb, and a body that limbs hang on, are divided
-//! in two before they can be put on. So parts are merged until it is foreseen that few enough pieces come of them:
-//! first those whose merging makes up for itself, as of a hand with its forearm, then those that change the
-//! division least.
+//! A division that people would draw seldom locks. A ring around a limb, or a body that limbs hang on, must
+//! be divided in two before it can be put on. So parts are merged until the predicted number of pieces is
+//! small enough. First come merges that pay for themselves, such as a hand with its forearm, then those that
+//! change the division least.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,10 +15,11 @@ use super::split::euler_characteristics;
 use crate::SegmentedSurface;
 use crate::seam::seam_half_edges;
 
-/// Pieces that are foreseen of the divisions that are proposed, in pieces wanted.
+/// Predicted numbers of pieces of the proposed divisions, as multiples of the number wanted.
 const FORESEEN: [f64; 3] = [1.6, 1.3, 1.0];
 
-/// The division that `labels` say, and others with fewer parts: finest first, each other than the one before.
+/// Returns up to three divisions with no more parts than `labels`: finest first, each with another number of
+/// parts. Even the first has all merges that pay for themselves.
 pub(super) fn with_fewer_parts(solid: &Solid, labels: &FaceLabels, n_wanted: usize) -> Vec<FaceLabels> {
     let topology = Topology::new(solid);
     let mut parts = Parts::new(solid.mesh(), &topology, labels);
@@ -35,8 +36,8 @@ pub(super) fn with_fewer_parts(solid: &Solid, labels: &FaceLabels, n_wanted: usi
     found
 }
 
-/// How often two random points are together in one division and apart in the other, [0, 1]: 1 − Rand index, by
-/// area. `labels` are of the triangles that `surface` was cut from.
+/// Probability that two random points are together in one division and apart in the other, [0, 1]: 1 − Rand
+/// index, by area. `labels` belong to the triangles from which `surface` was cut.
 pub(super) fn disagreement(labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
     let (mut both, mut own, mut others) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     let total = surface.mesh.area().max(f64::MIN_POSITIVE);
@@ -52,7 +53,7 @@ pub(super) fn disagreement(labels: &FaceLabels, surface: &SegmentedSurface) -> f
     own + others - 2.0 * squares(&mut both.values())
 }
 
-/// The seam of two parts.
+/// The seam between two parts.
 #[derive(Default)]
 struct Border {
     n_edges: i64,
@@ -60,17 +61,17 @@ struct Border {
 }
 
 impl Border {
-    /// 1 for each stretch between two other parts, 0 for each closed one.
+    /// Euler characteristic of the seam: 1 for each open stretch between other parts, 0 for each closed one.
     fn euler(&self) -> i64 {
         self.points.len() as i64 - self.n_edges
     }
 }
 
-/// Parts while they merge.
+/// State of the parts during merging.
 struct Parts {
-    /// The part that each part became.
+    /// For each part, the part that it was merged into.
     into: Vec<u32>,
-    /// Share of the area.
+    /// Share of the area, by part.
     share: Vec<f64>,
     euler: Vec<i64>,
     borders: BTreeMap<[u32; 2], Border>,
@@ -100,7 +101,7 @@ impl Parts {
         }
     }
 
-    /// Pieces that come of all parts, as is foreseen.
+    /// Predicted number of pieces of all parts.
     fn n_foreseen(&self) -> usize {
         let is_left = |&p: &usize| self.into[p] as usize == p;
         (0..self.into.len())
@@ -109,8 +110,8 @@ impl Parts {
             .sum()
     }
 
-    /// Merges the two parts that cost least for each piece that is foreseen to be saved, where `is_cheap` says so of
-    /// that; false where there are none.
+    /// Merges the two parts with the least loss for each piece predicted to be saved, if `is_cheap` accepts
+    /// that loss. Returns false if there are none.
     fn merge_cheapest(&mut self, is_cheap: impl Fn(f64) -> bool) -> bool {
         let mut best: Option<(f64, [u32; 2])> = None;
         for (&pair, border) in &self.borders {
@@ -128,8 +129,8 @@ impl Parts {
         true
     }
 
-    /// What a merge adds to the disagreement with the division as it was, less what halving would have added, for
-    /// each piece saved; `None` where it saves none.
+    /// Disagreement with the original division that a merge adds, less what halving would have added, for
+    /// each piece saved. `None` if the merge saves no piece.
     fn loss(&self, [a, b]: [u32; 2], border: &Border) -> Option<f64> {
         let halving = |share: f64, euler: i64| {
             if pieces_of(euler) > 1 {
@@ -176,7 +177,7 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Pieces that come of a part: a disk is one, all else is halved.
+/// Predicted number of pieces of a part: a disk is one, any other shape is halved.
 fn pieces_of(euler: i64) -> usize {
     if euler == 1 { 1 } else { 2 }
 }
@@ -188,7 +189,7 @@ mod tests {
     use super::*;
     use crate::testing::sphere;
 
-    /// A ball in three slices: two caps and a ring between.
+    /// A ball in three slices: two caps and a ring between them.
     fn slices() -> (Solid, FaceLabels) {
         let ball = Solid::new(sphere(3, Vec3::splat(10.0))).expect("closed");
         let slice = |f: usize| {

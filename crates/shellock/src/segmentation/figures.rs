@@ -1,8 +1,8 @@
-//! A division of a surface in figures: how large its pieces are, where its seams run, who sees them, and whether
-//! its pieces hold each other. Nothing is planned for it.
+//! Figures of a division: sizes of its pieces, course and visibility of its seams, and how well its pieces
+//! hold each other. Nothing is planned for the division.
 //!
-//! Seams are looked at in samples of at most a millimetre. What a seam lies in is read off the section
-//! across it:
+//! Seams are sampled in steps of at most a millimetre. The section across a seam tells if it lies in a
+//! crease:
 //!
 //! ```text
 //!    \      |      /
@@ -29,16 +29,16 @@ pub use shellock_segment::symmetry::Plane;
 use super::split::euler_characteristics;
 use crate::{Adjacency, ContactGraph, PatchId, SegmentedSurface};
 
-/// What figures depend on beside the division. Lengths in mm.
+/// Parameters of the figures beside the division. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureParams {
-    /// Upwards as the model stands, a unit vector; z.
+    /// Up direction of the standing model, a unit vector; z.
     pub up: [f64; 3],
-    /// Depth at which contacts are measured, where connectors are. [0, 10]; 0, the outer surface.
+    /// Depth at which contacts are measured, where connectors lie. [0, 10]; 0, the outer surface.
     pub wall_mm: f64,
-    /// Shortest stretch of seam that counts as a contact. [0, 100]; 9, as pieces are divided for.
+    /// Shortest stretch of seam that counts as a contact. [0, 100]; 9, as in the division of pieces.
     pub min_contact_mm: f64,
-    /// The plane that the model is alike on both sides of, if there is one.
+    /// Plane of symmetry of the model, if there is one.
     pub mirror: Option<Plane>,
 }
 
@@ -53,89 +53,88 @@ impl Default for FigureParams {
     }
 }
 
-/// What there is to say of a division. Shares are in [0, 1].
+/// All figures of a division. Shares are in [0, 1].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DivisionFigures {
-    /// How many pieces there are.
+    /// Number of pieces in all.
     pub n_pieces: usize,
     /// Areas of the pieces' skins.
     pub area_mm2: Spread,
-    /// Where seams run.
+    /// Course and visibility of the seams.
     pub seams: SeamFigures,
-    /// What pieces hold each other by.
+    /// Contacts by which pieces hold each other.
     pub contacts: ContactFigures,
-    /// Each piece, by its number.
+    /// Figures of each piece, by its number.
     pub pieces: Vec<PieceFigures>,
-    /// Share of the surface whose mirror image belongs to the piece that is its piece's image; `None` without a
-    /// plane.
+    /// Share of the surface whose mirror image belongs to the image of its piece; `None` without a plane.
     pub mirrored_share: Option<f64>,
 }
 
-/// Of several values; all 0 where there are none.
+/// Least, median and largest of several values; all 0 if there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// The least.
+    /// Least of the values.
     pub least: f64,
-    /// The middle one, or the mean of the two in the middle.
+    /// Middle value, or the mean of the two in the middle.
     pub median: f64,
-    /// The largest.
+    /// Largest of the values.
     pub largest: f64,
 }
 
-/// Where seams run, as shares of their length; all 0 where there is none.
+/// Course of the seams, as shares of their length; all 0 if there is no seam.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SeamFigures {
     /// Length of all seams, mm.
     pub length_mm: f64,
-    /// In concave creases: the surface bends inwards by more than 10° within 3 mm on each side.
+    /// Share in concave creases, where the surface bends inwards by more than 10° within 3 mm on each side.
     pub concave_share: f64,
-    /// Where it bends by less either way.
+    /// Share where the surface bends by at most 10° either way.
     pub flat_share: f64,
-    /// Over convex edges: it bends outwards by more.
+    /// Share over convex edges, where the surface bends outwards by more than 10°.
     pub convex_share: f64,
-    /// In sight, in the mean of eight level views around the model, 45° apart.
+    /// Visible share, as the mean of eight level views around the model, 45° apart.
     pub visible_share: f64,
-    /// In sight from the front, and in no concave crease.
+    /// Share visible from the front that does not lie in a concave crease.
     pub front_share: f64,
-    /// Points where three or more pieces meet.
+    /// Number of points at which three or more pieces meet.
     pub n_triple_points: usize,
 }
 
-/// What pieces hold each other by: for each two that touch the longest stretch of seam between them.
+/// Contacts by which pieces hold each other. For each pair of pieces, the longest stretch of seam counts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactFigures {
     /// Pairs of pieces with a stretch that is long enough.
     pub n_contacts: usize,
-    /// The shortest of those stretches, mm at the depth asked for; `None` where there is none.
+    /// Length of the shortest of those stretches, mm, at the depth requested; `None` if there is none.
     pub shortest_mm: Option<f64>,
-    /// Pairs that touch, but by shorter stretches alone.
+    /// Pairs of pieces that touch, but only by shorter stretches.
     pub n_short: usize,
-    /// How far from "no piece holds others alone", in pieces; 0 where it is so.
+    /// Number of faults of the contact graph, in pieces; 0 if no piece is the only link to others.
     pub n_faults: usize,
-    /// Pieces that alone hold others.
+    /// Articulation pieces, each the only link between others.
     pub hold_alone: Vec<PatchId>,
 }
 
-/// One piece.
+/// Figures of one piece.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PieceFigures {
-    /// Which.
+    /// Number of the piece.
     pub piece: PatchId,
     /// Area of its skin, mm².
     pub area_mm2: f64,
-    /// Whether its skin is connected, with one border and no handle.
+    /// True if its skin is connected, with one border and no handle.
     pub is_disk: bool,
-    /// Where its skin faces.
+    /// Cone of directions that its skin faces.
     pub faces: Cone,
 }
 
-/// Where a viewer stands who sees the front of a model that stands with `up` (a unit vector) upwards: a level unit
-/// vector from the model to them.
+/// Direction from a model to the viewer of its front, as a level unit vector. The model stands with `up`, a
+/// unit vector, upwards.
 ///
-/// What has z up is looked at from −y, as 3D programs do; other models are first turned by the least angle that
-/// makes them stand. So what has y up has its front towards z. This is the one place that says so.
+/// A model with z up is viewed from −y, as 3D programs do. Other models are first turned by the least angle
+/// that makes them stand. So a model with y up has its front towards z. This convention is defined only here.
 pub fn front_of(up: [f64; 3]) -> [f64; 3] {
-    /// Upside down: every way to turn is as short.
+    /// Distance of 1 + up.z from 0 below which the model is upside down: then all turns are equally short.
     const OPPOSITE: f64 = 1e-9;
     let (up, z, front) = (Vec3::from(up), Vec3::Z, Vec3::NEG_Y);
     let both = z + up;
@@ -146,10 +145,10 @@ pub fn front_of(up: [f64; 3]) -> [f64; 3] {
     (front - both.dot(front) / (1.0 + up.z) * both).to_array()
 }
 
-/// The figures of `surface`.
+/// Measures all figures of `surface`.
 ///
 /// # Panics
-/// Where its mesh is not closed, which a [`SegmentedSurface`] promises to be.
+/// If its mesh is not closed, which a [`SegmentedSurface`] promises to be.
 pub fn figures(params: &FigureParams, surface: &SegmentedSurface) -> DivisionFigures {
     let topology = Topology::of_mesh(&surface.mesh).expect("a segmented surface is closed");
     let bvh = TriangleBvh::new(&surface.mesh);

@@ -1,4 +1,4 @@
-//! Shorter edges, so that patches and seams have points enough.
+//! Subdivision of long edges, so that patches and seams have enough points.
 
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::topology::ends;
@@ -6,8 +6,8 @@ use shellock_geom::{Solid, Topology};
 
 use super::{FaceLabels, SegmentationParams};
 
-/// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound
-/// their triangles.
+/// Halves edges until none is longer than the limit. For models much larger than 300 mm, the limit grows to
+/// bound the number of triangles.
 pub(super) fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (Solid, Vec<u32>) {
     let limit_mm = params.max_edge_mm.max((solid.mesh().area() / 20_000.0).sqrt());
     let mut fine = solid.clone();
@@ -28,7 +28,7 @@ pub(super) fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (S
     }
 }
 
-/// Halves edges near seams so that curves have points enough to be smooth.
+/// Halves edges near seams so that curves have enough points to be smooth.
 pub(super) fn halve_edges_near_seams(
     solid: &Solid,
     labels: &FaceLabels,

@@ -1,8 +1,8 @@
-//! Regions of the surface that no seam is to divide, such as a figure's face.
+//! Regions of the surface that no seam may divide, such as a figure's face.
 //!
-//! Each part of a region that hangs together is kept whole by itself. Methods give it to one patch, mending never
-//! divides it, and keys are cut elsewhere; seams are smoothed as everywhere, so that [`tell_cut`] measures what came
-//! of it in the end.
+//! Each connected part of a region is kept whole by itself. Methods give it to one patch, repair never
+//! divides it, and keys are cut elsewhere. Seams are smoothed as everywhere, so [`tell_cut`] measures the
+//! final result.
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::bvh::nearest_on_triangle;
@@ -14,30 +14,30 @@ use super::user::user_labels;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning};
 
-/// What of a region must be in one piece, as a share of its area: smoothing takes a rim.
+/// Least share of a region's area that must lie in one piece. Smoothing may take a rim.
 const LEAST_SHARE: f64 = 0.98;
-/// A region with more than this share of the surface leaves too little to divide.
+/// Greatest share of the surface in a region; more leaves too little to divide.
 const MOST_SHARE: f64 = 0.5;
 
-/// A region that no seam is to divide.
+/// A region that no seam may divide.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KeepWhole {
-    /// The surface within a ball, in the space of the model, mm.
+    /// Surface within a ball, in the space of the model, mm.
     Sphere {
-        /// Its centre.
+        /// Centre of the ball.
         center_mm: [f64; 3],
-        /// Its radius. > 0.
+        /// Radius of the ball; > 0.
         radius_mm: f64,
     },
-    /// What has this label, where there are labels.
+    /// Triangles with this label, if there are labels.
     Label(i64),
-    /// Triangles of the model: what [`resolved`] makes of a label.
+    /// Triangles of the model. [`resolved`] turns a label into these.
     Faces(Vec<u32>),
 }
 
 impl KeepWhole {
-    /// What is wrong with it by itself, for people.
+    /// Problem of the region by itself, as a message for people, if any.
     pub(super) fn problem(&self) -> Option<String> {
         let Self::Sphere { center_mm, radius_mm } = self else {
             return None;
@@ -49,7 +49,7 @@ impl KeepWhole {
         })
     }
 
-    /// The faces of `mesh` that it has; those that a ball `margin_mm` larger touches.
+    /// Faces of `mesh` in the region. For a ball, these are the faces that touch one larger by `margin_mm`.
     fn faces(&self, mesh: &TriMesh, source_face: &[u32], margin_mm: f64) -> Vec<u32> {
         let all = 0..mesh.triangles.len() as u32;
         match self {
@@ -69,7 +69,7 @@ impl KeepWhole {
         }
     }
 
-    /// It in words, for people.
+    /// Description of the region for messages.
     fn words(&self) -> String {
         match self {
             Self::Sphere {
@@ -84,9 +84,9 @@ impl KeepWhole {
     }
 }
 
-/// The regions with labels as the triangles that have them, each checked against the model.
+/// Replaces labels by the triangles that have them, and checks each region against the model.
 ///
-/// An error where one is empty, or has more than half of the surface.
+/// Fails if a region is empty, has more than half of the surface, or names a label of a model without labels.
 pub fn resolved(
     keep: &[KeepWhole],
     solid: &Solid,
@@ -126,7 +126,7 @@ pub fn resolved(
         .collect()
 }
 
-/// Area of those of `faces` that lie inside the region with their centres, mm².
+/// Area of those of `faces` whose centres lie inside the region, mm².
 fn inner_area_mm2(region: &KeepWhole, mesh: &TriMesh, faces: &[u32]) -> f64 {
     let is_inner = |f: &&u32| match region {
         KeepWhole::Sphere { center_mm, radius_mm } => {
@@ -141,8 +141,8 @@ fn inner_area_mm2(region: &KeepWhole, mesh: &TriMesh, faces: &[u32]) -> f64 {
         .sum()
 }
 
-/// The sets of faces of `mesh` that are to be of one patch each, balls larger by `margin_mm`; `source_face` names
-/// the model's triangles.
+/// Sets of faces of `mesh` that must each belong to one patch. Balls are enlarged by `margin_mm`, and
+/// `source_face` refers to the model's triangles.
 pub(crate) fn whole(
     keep: &[KeepWhole],
     mesh: &TriMesh,
@@ -157,7 +157,7 @@ pub(crate) fn whole(
     Whole::new(mesh.triangles.len(), sets)
 }
 
-/// The parts of `faces` that hang together.
+/// Connected parts of `faces`.
 fn parts(topology: &Topology, mesh: &TriMesh, faces: &[u32]) -> Vec<Vec<u32>> {
     if faces.is_empty() {
         return Vec::new();
@@ -173,13 +173,14 @@ fn parts(topology: &Topology, mesh: &TriMesh, faces: &[u32]) -> Vec<Vec<u32>> {
     parts
 }
 
-/// How much larger balls are while patches are made, mm: what smoothing takes of a patch.
+/// Margin by which balls are enlarged while patches are made, mm: the width that smoothing may take from a
+/// patch.
 pub(super) fn margin_mm(params: &SegmentationParams) -> f64 {
     params.smoothing_mm2.max(0.0).sqrt()
 }
 
-/// Patches of which none divides a set of `whole`: each is given to the patch that has most of it, and what is too
-/// small then joins a neighbour.
+/// Gives each set of `whole` to the patch that has most of it. Patches that are then too small join a
+/// neighbour.
 pub(super) fn gathered(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -197,7 +198,8 @@ pub(super) fn gathered(
     user_labels(&ctx.fork(), params, solid, &labels)
 }
 
-/// Warns of each region, resolved, of which less than 98 % is in one piece, with the largest place beside that piece.
+/// Warns of each resolved region with less than 98 % of its area in one piece. Names the largest place
+/// outside that piece.
 pub(super) fn tell_cut(ctx: &Ctx, keep: &[KeepWhole], surface: &SegmentedSurface) {
     let mesh = &surface.mesh;
     let Some(topology) = Topology::of_mesh(mesh).filter(|_| !keep.is_empty()) else {
@@ -228,7 +230,7 @@ pub(super) fn tell_cut(ctx: &Ctx, keep: &[KeepWhole], surface: &SegmentedSurface
     }
 }
 
-/// A place of a region, resolved, that lies in one of `pieces`.
+/// Some place of a resolved region that lies in one of `pieces`.
 pub(super) fn place_in(
     keep: &[KeepWhole],
     surface: &SegmentedSurface,
@@ -242,8 +244,8 @@ pub(super) fn place_in(
     inside.next().map(|f| mesh.face_center(f as usize).to_array())
 }
 
-/// Of connected faces: the area in the piece that has most of it, all the area, mm², the pieces, largest first, and
-/// a place in what is not in the first.
+/// Division of connected faces among pieces: the area in the piece that has most of them; the total area,
+/// mm²; the pieces, largest first; and a place outside the first piece.
 fn in_one_piece(surface: &SegmentedSurface, part: &[u32]) -> (f64, f64, Vec<PatchId>, Vec3) {
     let mesh = &surface.mesh;
     let mut area = std::collections::BTreeMap::<PatchId, f64>::new();

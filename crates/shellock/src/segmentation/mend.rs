@@ -1,4 +1,4 @@
-//! From a drawn division to one whose smooth seams hold every piece twice.
+//! Repair of a drawn division until the contact graph of its smooth seams has no faults.
 
 use shellock_segment::mirrored::Mirrored;
 
@@ -9,17 +9,19 @@ use super::smooth::smooth_and_cut;
 use super::{FaceLabels, LabelOrigin, SegmentationError, SegmentationParams};
 use crate::{Ctx, SegmentedSurface};
 
-/// How often refining is repeated with a stricter limit when smoothing shortened a contact below the limit.
+/// Greatest number of repair rounds. A round follows with a stricter limit if smoothing shortened a contact
+/// below the limit.
 const MAX_ROUNDS: usize = 4;
-/// How much stricter each repetition is.
+/// Factor by which the limit grows in each round.
 const STRICTER: f64 = 1.15;
-/// Both sides are divided alike where that takes at most so many times the pieces.
+/// Greatest factor on the number of pieces for which both sides are divided alike.
 const MORE_FOR_SYMMETRY: f64 = 1.5;
 
-/// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where
-/// none does. Ends before it cuts what `is_too_dear`.
+/// Repairs, smooths and cuts until the contact graph of the smooth seams has no faults. If no round achieves
+/// this, returns the best round with its number of faults. Stops before it cuts a division that
+/// `is_too_dear`.
 ///
-/// Both sides alike where that is asked for and leaves no fault.
+/// Divides both sides alike if that is requested and leaves no fault.
 pub(super) fn held_twice(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -52,7 +54,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Rounds with ever stricter limits: the best, and its faults.
+    /// Runs rounds with ever stricter limits. Returns the best, with its number of faults.
     fn rounds(
         &self,
         mut labels: FaceLabels,
@@ -87,15 +89,15 @@ impl Job<'_> {
     }
 }
 
-/// Which triangle is whose mirror image where both sides are to be divided alike; `None` without a plane.
+/// Mirror image of each triangle if both sides are to be divided alike; `None` without a plane of symmetry.
 pub(super) fn mirror_images(params: &SegmentationParams, ground: &Ground<'_>) -> Option<Mirrored> {
     let is_asked = params.symmetric && params.method.knows_symmetry();
     let plane = is_asked.then(|| symmetry_plane(params, ground.solid)).flatten()?;
     Some(Mirrored::new(&plane, ground.solid.mesh(), ground.graph()))
 }
 
-/// One side's patches on both sides, mended once more; `labels` as they are where that takes too many pieces or has
-/// more faults.
+/// Copies one side's patches to the other and repairs again. Returns `labels` unchanged if that needs too
+/// many pieces or has more faults.
 fn mended_alike(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -113,7 +115,7 @@ fn mended_alike(
     Ok(if is_good { mended } else { labels })
 }
 
-/// The surface with its seams settled and smooth, or smooth alone where a patch would vanish.
+/// Surface with settled and smooth seams. The seams are only smoothed if settling would make a patch vanish.
 fn settled_surface(
     ctx: &Ctx,
     params: &SegmentationParams,

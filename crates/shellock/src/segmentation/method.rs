@@ -1,4 +1,4 @@
-//! Where nobody labelled: patches by one of several methods.
+//! Automatic division of a surface without labels, by one of several methods.
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};
@@ -22,21 +22,21 @@ use super::user::user_labels;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::Ctx;
 
-/// Parts with less than this share of the surface join a neighbour: curls and claws are no pieces.
+/// Least share of the surface for a part. Smaller parts join a neighbour: curls and claws are no pieces.
 const LEAST_SHARE: f64 = 0.012;
 
-/// How a surface is divided where nobody labelled it. What each is worth: [`shellock_segment`].
+/// Method that divides a surface without labels. The methods are compared in [`shellock_segment`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// The best cuts that all methods propose.
+    /// Best of the cuts that all methods propose.
     #[default]
     Auto,
-    /// The cuts that most of many random ones agree on.
+    /// Cuts on which most of many random ones agree.
     RandomCuts,
-    /// Parts of one thickness each.
+    /// Parts that each have one thickness.
     Sdf,
-    /// Parts that planes, spheres and cylinders fit.
+    /// Parts that fit planes, spheres and cylinders.
     Primitives,
     /// Parts around representatives, by distance and turning.
     Kmeans,
@@ -45,7 +45,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// All of them.
+    /// All methods, the default first.
     pub const ALL: [Self; 6] = [
         Self::Auto,
         Self::RandomCuts,
@@ -55,7 +55,7 @@ impl Method {
         Self::Creases,
     ];
 
-    /// Its name in files and on the command line.
+    /// Name of the method in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -67,17 +67,17 @@ impl Method {
         }
     }
 
-    /// The method of that name.
+    /// Finds the method with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
-    /// Whether it can divide both sides of a model alike.
+    /// Returns true if the method can divide both sides of a model alike.
     pub fn knows_symmetry(self) -> bool {
         matches!(self, Self::Auto | Self::RandomCuts)
     }
 
-    /// A part for each face; `None` for patches in creases, which are not found on meshes alone.
+    /// Part of each face; `None` for patches in creases, which need more than a mesh.
     fn parts(self, params: &SegmentationParams, mesh: &TriMesh, whole: &Whole) -> Option<Divided> {
         let SegmentationParams {
             n_pieces: n_parts,
@@ -125,22 +125,22 @@ impl Method {
     }
 }
 
-/// The plane that `solid` is about the same on both sides of, which a division may be, too; `None` where there is
-/// none ([`symmetry::plane`]).
+/// Plane about which `solid` is nearly symmetric, so that a division may be, too. `None` if there is none
+/// ([`symmetry::plane`]).
 pub fn symmetry_plane(params: &SegmentationParams, solid: &Solid) -> Option<Plane> {
     let (fine, _) = halve_long_edges(params, solid);
     symmetry::plane(&Coarse::new(fine.mesh(), RandomCutsParams::default().n_faces).mesh)
 }
 
-/// `labels` of a symmetric solid made the same on both sides, after the side that has more parts; `None` where
-/// there is no plane of symmetry.
+/// Makes `labels` of a symmetric solid symmetric, after the side that has more parts. `None` if there is no
+/// plane of symmetry.
 pub fn mirrored_labels(params: &SegmentationParams, solid: &Solid, labels: &[u32]) -> Option<Vec<u32>> {
     let plane = symmetry_plane(params, solid)?;
     let graph = FaceGraph::new(solid.mesh());
     Some(Mirrored::new(&plane, solid.mesh(), &graph).labels(&graph, labels))
 }
 
-/// What a division that was to be the same on both sides is the same about.
+/// Message about the plane of a division that was to be symmetric.
 fn told(plane: Option<Plane>) -> String {
     let Some(Plane { at, normal }) = plane else {
         return "no plane of symmetry is found: both sides are divided as they are".to_owned();
@@ -151,9 +151,9 @@ fn told(plane: Option<Plane>) -> String {
     )
 }
 
-/// Patches by the method of `params`: connected, none too small; the same for the same seed.
+/// Divides by the method of `params` into connected patches, none too small. One seed gives one result.
 ///
-/// `None`, which is noted, where the method finds nothing to divide, as on a ball.
+/// Returns `None`, with a note, if the method finds nothing to divide, as on a ball.
 pub fn automatic_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -163,7 +163,7 @@ pub fn automatic_labels(
     automatic_on(ctx, params, solid, &Ground::keeping(params, solid, &own).whole)
 }
 
-/// Patches in creases of which none divides a set of `whole`.
+/// Patches in creases, none of which divides a set of `whole`.
 pub(super) fn creases_on(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -173,7 +173,7 @@ pub(super) fn creases_on(
     gathered(ctx, params, solid, whole, crease_labels(ctx, params, solid)?)
 }
 
-/// The same where no patch divides a set of `whole`.
+/// Divides like [`automatic_labels`], without dividing any set of `whole`.
 pub(super) fn automatic_on(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -196,7 +196,7 @@ pub(super) fn automatic_on(
         min_piece_mm2: params.min_piece_mm2.max(LEAST_SHARE * solid.mesh().area()),
         ..params.clone()
     };
-    // What is too small is merged, which is told of labels that people gave.
+    // Merges of small parts are reported only for labels that people gave.
     match user_labels(&ctx.fork(), &large, solid, &labels) {
         Err(
             SegmentationError::OneLabel { .. }

@@ -1,9 +1,9 @@
-//! Makes all patches disks and their contacts 2-connected, by dividing the patches that stand in the way.
+//! Makes all patches disks and their contacts 2-connected, by dividing the patches that prevent it.
 //!
-//! A piece that alone holds others is divided through its seam with them, so that two pieces hold them; a
-//! ring around a limb is divided lengthwise, as it could hardly be put on otherwise. See
-//! [`crate::seam::graph`] for why. Where no division helps, because the seam is too short for two contacts,
-//! what hangs on a piece is joined to it.
+//! A piece that is the only link to others is divided through its seam with them, so that two pieces hold
+//! them. A ring around a limb is divided lengthwise, since it is hard to put on otherwise. The reasons are in
+//! [`crate::seam::graph`]. If no division helps, because the seam is too short for two contacts, the
+//! dependent pieces are joined to the piece that holds them.
 
 use std::sync::OnceLock;
 
@@ -20,23 +20,23 @@ use crate::seam::graph::Adjacency;
 use crate::seam::seam_half_edges;
 use crate::{ContactGraph, Ctx, PatchId};
 
-/// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square
-/// grid.
+/// Ratio of the length of a seam along triangle edges to that of the smooth one: 4/π for random directions on
+/// a square grid.
 const ZIGZAG: f64 = 1.27;
 
-/// How much larger than the smallest piece a half must be, as smoothing takes from narrow patches.
+/// Least area of a half, as a multiple of the smallest piece. Smoothing shrinks narrow patches.
 const SPLIT_RESERVE: f64 = 2.0;
 
-/// Divisions in a row that may leave as many faults as before: a handle or a patch with several holes needs
-/// some before one helps.
+/// Divisions in a row that may leave as many faults as before. A handle or a patch with several holes needs
+/// some of them before one helps.
 const MAX_IDLE_DIVISIONS: usize = 3;
 
-/// The labels with patches divided until each is a disk and no piece alone holds others, or until
-/// `max_splits` or `min_piece_mm2` forbid more. Pieces that touch nothing long enough join a neighbour, and
-/// so do those that hang on one piece by a seam too short for two contacts. Old patches keep their numbers
+/// Divides patches until each is a disk and no piece is the only link to others, or until `max_splits` or
+/// `min_piece_mm2` forbid more. A piece without any contact that is long enough joins a neighbour. So does
+/// one that is linked to a single piece by a seam too short for two contacts. Old patches keep their numbers
 /// unless some are joined.
 ///
-/// The result may still fall short; ask
+/// The result may still have faults; check
 /// [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
 pub fn refine(
     ctx: &Ctx,
@@ -47,23 +47,24 @@ pub fn refine(
     refine_on(ctx, params, &Ground::new(solid), labels)
 }
 
-/// What refining asks of a surface, made once for all rounds.
+/// Data of a surface for refining, computed once for all rounds.
 pub(super) struct Ground<'a> {
     pub solid: &'a Solid,
     pub topology: Topology,
     pub faces: DualGraph,
-    /// What no division parts.
+    /// Sets of faces that no division may part.
     pub whole: Whole,
     graph: OnceLock<FaceGraph>,
 }
 
 impl<'a> Ground<'a> {
-    /// A surface of which nothing is kept whole.
+    /// Prepares a surface without regions to keep whole.
     pub fn new(solid: &'a Solid) -> Self {
         Self::keeping(&SegmentationParams::default(), solid, &[])
     }
 
-    /// A surface with the regions, resolved, that `params` keep whole; `source_face` names the model's triangles.
+    /// Prepares a surface with the resolved regions that `params` keep whole; `source_face` refers to the
+    /// model's triangles.
     pub fn keeping(params: &SegmentationParams, solid: &'a Solid, source_face: &[u32]) -> Self {
         let topology = Topology::new(solid);
         let (keep, margin_mm) = (&params.keep_whole, margin_mm(params));
@@ -76,13 +77,13 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// The triangles and their creases, as methods see them.
+    /// Graph of the triangles and their creases, in the form that methods use.
     pub fn graph(&self) -> &FaceGraph {
         self.graph.get_or_init(|| FaceGraph::new(self.solid.mesh()))
     }
 }
 
-/// [`refine`] on a surface that was looked at before.
+/// Runs [`refine`] on a surface that is already prepared.
 pub(super) fn refine_on(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -114,7 +115,7 @@ pub(super) fn refine_on(
     Ok(best.1)
 }
 
-/// What is wrong with `labels`: pieces that hold others alone, and patches that are no disks.
+/// Number of faults of `labels`: pieces that are the only link to others, and patches that are no disks.
 pub(super) fn n_faults(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> usize {
     Work::new(params, ground, labels).n_faults()
 }
@@ -126,8 +127,8 @@ struct Work<'a> {
     min_contact_mm: f64,
 }
 
-/// Where the graph falls apart: the piece of the smaller part with the longest contact to the rest, and the
-/// piece it has that with.
+/// Missing link of a disconnected graph: the piece of the smallest part with the longest contact to the rest,
+/// and its partner in that contact. `None` if the graph is connected.
 fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     let parts = graph.parts();
     if parts.len() < 2 || graph.n_patches() <= 2 {
@@ -195,7 +196,7 @@ impl<'a> Work<'a> {
         areas
     }
 
-    /// By how much each patch differs from a disk.
+    /// Difference of each patch's Euler characteristic from that of a disk.
     fn holes(&self) -> Vec<usize> {
         let euler = euler_characteristics(
             self.divider.mesh,
@@ -209,13 +210,13 @@ impl<'a> Work<'a> {
             .collect()
     }
 
-    /// Faults of the graph and of all patches.
+    /// Total number of faults of the graph and of all patches.
     fn n_faults(&self) -> usize {
         self.graph(&self.seam()).n_faults() + self.holes().iter().sum::<usize>()
     }
 
-    /// Divides the patch with most faults whose division leaves fewer of them, or, `may_idle`, a patch that
-    /// is no disk in any way; false where there is none.
+    /// Divides the patch with most faults whose division leaves fewer faults. If there is none and
+    /// `may_idle`, divides a patch that is no disk without improvement. Returns false if nothing was divided.
     fn divide_worst(&mut self, seam: &[HalfEdge], graph: &ContactGraph, may_idle: bool) -> bool {
         let holes = self.holes();
         let hanging = |k: usize| graph.parts_without(PatchId::from(k)).len().saturating_sub(1);
@@ -252,11 +253,11 @@ impl<'a> Work<'a> {
         self.n_patches += 1;
     }
 
-    /// The best way to divide `patch`, mostly through its seams with what hangs on it.
+    /// Best division of `patch`, mostly through its seams with the pieces that depend on it.
     fn best_division(&self, seam: &[HalfEdge], graph: &ContactGraph, patch: u32) -> Option<Division> {
         let n_parts = graph.parts().len();
         let parts = graph.parts_without(PatchId(patch));
-        // A part that no counted contact ties to this patch cannot be reached by dividing it.
+        // A part without a counted contact to this patch cannot be reached by dividing it.
         let pairs: Vec<[u32; 2]> = if parts.len() > 1 {
             parts
                 .iter()
@@ -279,7 +280,7 @@ impl<'a> Work<'a> {
             });
             let seams: Vec<HalfEdge> = all.collect();
             let after = raw_contact_graph(divider, label, n + 1, &seams, min_contact_mm);
-            // A half that nothing holds would be joined again, and so on without end.
+            // A half that nothing holds would be joined again, in an endless loop.
             if after.parts().len() > n_parts {
                 f64::INFINITY
             } else {
@@ -289,7 +290,7 @@ impl<'a> Work<'a> {
         divider.best(&self.label, n, patch, &pairs, faults)
     }
 
-    /// Two triangles of `patch`, far apart along its seam with the pieces of `part`.
+    /// Two triangles of `patch` that are far apart along its seam with the pieces of `part`.
     fn far_points(&self, seam: &[HalfEdge], patch: u32, part: &[PatchId]) -> Option<[u32; 2]> {
         let beside: Vec<u32> = seam
             .iter()
@@ -314,8 +315,9 @@ impl<'a> Work<'a> {
         Some([one, farthest(one)?])
     }
 
-    /// Joins a piece that hangs on another to it, or one to the piece it holds alone: of the pairs that leave
-    /// the fewest faults the one with the smallest piece. False where none leaves fewer.
+    /// Joins two pieces in contact, one of which is an articulation piece. Among the pairs that leave the
+    /// fewest faults, takes the one with the smallest piece. Returns false if none leaves fewer faults than
+    /// before.
     fn join_hanging(&mut self, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
         if self.n_patches <= 2 {
             return false;
@@ -377,7 +379,7 @@ impl<'a> Work<'a> {
                 .sum::<usize>()
     }
 
-    /// Gives `loose` to `into`; the last number takes the one that became free.
+    /// Merges `loose` into `into`. The last patch takes the number that became free.
     fn join(&mut self, loose: u32, into: u32) {
         let last = self.n_patches as u32 - 1;
         for k in &mut self.label {

@@ -1,20 +1,21 @@
-//! Moves seams into creases, and shortens them where there are none.
+//! Moves seams into creases, and shortens them elsewhere.
 //!
-//! Dividing cuts by planes and by equal distance, across whatever lies there. Each seam is then free within a band
-//! and runs where it is cheapest: its length, less in concave creases ([`border::prices`]).
+//! Dividing cuts by planes and by equal distance, whatever the shape there. Afterwards each seam is free
+//! within a band and takes the cheapest path. The price is its length, reduced in concave creases
+//! ([`border::prices`]).
 
 use shellock_segment::border;
 
 use super::refine::{Ground, n_faults};
 use super::{FaceLabels, SegmentationParams};
 
-/// How far seams may move, mm, one round after the other.
+/// Greatest distances that seams may move, mm, in consecutive rounds.
 const BANDS_MM: [f64; 2] = [8.0, 4.0];
-/// Share of its area that a piece keeps: where there are no creases the shortest seam is around nothing.
+/// Least share of its area that a piece keeps. Without creases, the shortest seam would enclose nothing.
 const LEAST_KEPT: f64 = 0.7;
 
-/// `labels` with their seams settled, but for those whose move would cost a piece or a region that is kept whole, or
-/// add a fault.
+/// Settles the seams of `labels`. A seam stays where it is if its move would shrink a piece too far, lose
+/// one, cut a region to keep whole, or add a fault.
 pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> FaceLabels {
     let graph = ground.graph();
     let settler = border::Settler::new(graph);
@@ -54,7 +55,7 @@ mod tests {
     use super::*;
     use shellock_testkit::shapes::torus;
 
-    /// A ring whose tube is pinched at both ends of x: its narrowest sections lie there.
+    /// A ring whose tube is pinched at both ends of the x axis, where its narrowest sections lie.
     fn pinched() -> Solid {
         let mut ring = torus(30.0, 10.0, [72, 24]);
         for p in &mut ring.points {

@@ -1,7 +1,7 @@
-//! Smooth seams: labels diffuse a little, and the seam is where two of them tie.
+//! Smooth seams: labels diffuse slightly, and the seam lies where two of them tie.
 //!
 //! Soft labels `u_k = (M + t L)⁻¹ M 1_k` with lumped mass M, cotangent Laplacian L and t = `smoothing_mm2`:
-//! one implicit step of heat flow, which by the maximum principle keeps all u in [0, 1] and their sum at 1.
+//! one implicit step of heat flow. By the maximum principle, it keeps all u in [0, 1] and their sum at 1.
 
 use shellock_geom::laplacian::{half_cotangents, lumped_mass};
 use shellock_geom::sparse::{Cholesky, SparseSymmetric};
@@ -12,18 +12,18 @@ use super::halve::halve_edges_near_seams;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::{Ctx, PatchId, SegmentedSurface};
 
-/// Longest edge near a seam, in roots of the diffusion: the soft labels bend on that scale and are taken as
+/// Longest edge near a seam, in roots of the diffusion. The soft labels bend on that scale and are taken as
 /// linear in triangles.
 const MAX_SEAM_EDGE: f64 = 1.0;
-/// A patch may keep no less than this share of its area; otherwise its own diffusion is lowered.
+/// Least share of its area that a patch must keep; otherwise its own diffusion is lowered.
 const MIN_KEPT_SHARE: f64 = 0.5;
-/// How often a patch's diffusion is divided by 8 before it is switched off.
+/// Number of attempts with lower diffusion for a patch: each divides it by 8, and the last switches it off.
 const MAX_TRIES: usize = 4;
 
-/// The surface cut along smooth seams: closed, on the model's surface, each patch connected; `source_face`
-/// names triangles of `solid`.
+/// Cuts the surface along smooth seams. The result is closed, lies on the model's surface, and each patch is
+/// connected. `source_face` refers to triangles of `solid`.
 ///
-/// 0.2 s for 60 000 triangles and 10 patches. Fails where a patch is so small that no point of the mesh is
+/// Takes 0.2 s for 60 000 triangles and 10 patches. Fails if a patch is so small that no point of the mesh is
 /// its own.
 pub fn smooth_and_cut(
     ctx: &Ctx,
@@ -78,7 +78,7 @@ pub fn smooth_and_cut(
     unreachable!("the last attempt returns")
 }
 
-/// The patch ids in order of their first triangles, and each triangle's position in that order.
+/// Patch ids in order of their first triangles, and each triangle's position in that order.
 fn by_first_face(labels: &FaceLabels) -> (Vec<u32>, Vec<u32>) {
     let mut position = vec![u32::MAX; labels.n_patches()];
     let mut ids = Vec::new();
@@ -102,7 +102,8 @@ fn areas(mesh: &TriMesh, label: &[u32], n_patches: usize) -> Vec<f64> {
     areas
 }
 
-/// How much each point belongs to each patch, in [0, 1]; all points of one patch after the other.
+/// Degree to which each point belongs to each patch, in [0, 1]; all points of one patch after those of
+/// another.
 fn soft_labels(
     mesh: &TriMesh,
     mass: &[f64],
@@ -111,7 +112,7 @@ fn soft_labels(
 ) -> Result<Vec<f64>, SegmentationError> {
     let n_points = mesh.points.len();
     let floor = mass.iter().sum::<f64>() / n_points as f64 * 1e-9;
-    // A point without area, or without triangles, would make the matrix singular; with this it just keeps its
+    // A point without area or triangles would make the matrix singular. With this floor it just keeps its
     // label.
     let mut diagonal: Vec<f64> = mass.iter().map(|m| m.max(floor)).collect();
     let mut entries = Vec::with_capacity(3 * mesh.triangles.len() + n_points);
@@ -133,8 +134,8 @@ fn soft_labels(
     Ok(soft)
 }
 
-/// The patch that each point belongs to most, such that each patch's points are connected along edges:
-/// islands join what surrounds them.
+/// Patch to which each point belongs most. The points of each patch are connected along edges, since islands
+/// join the patch around them.
 fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize) -> Vec<u32> {
     let n_points = mesh.points.len();
     let mut owner: Vec<u32> = (0..n_points)
@@ -158,8 +159,8 @@ fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize
     edges.sort_unstable();
     let mut is_open = island;
     loop {
-        // One ring of the islands a round, each point as the first of its neighbours that has an owner
-        // already.
+        // Each round takes one ring of the islands. A point follows the first of its neighbours that has an
+        // owner.
         let mut won: Vec<(u32, u32)> = edges
             .iter()
             .filter(|&&(a, b)| is_open[a as usize] && !is_open[b as usize])
@@ -176,7 +177,7 @@ fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize
     }
 }
 
-/// Whether each point lies in a part of its patch that is not the patch's largest.
+/// True for each point in a part of its patch that is not the patch's largest.
 fn islands(mesh: &TriMesh, mass: &[f64], owner: &[u32], n_patches: usize) -> Vec<bool> {
     let mut parent: Vec<u32> = (0..owner.len() as u32).collect();
     fn root(parent: &mut [u32], mut v: u32) -> u32 {

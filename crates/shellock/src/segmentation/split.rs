@@ -1,9 +1,9 @@
 //! Divides one patch into two connected halves.
 //!
 //! Candidates are planes through the patch's middle, along and across its principal axes, and geodesic
-//! Voronoi cells of two far points. A plane that contains a limb's axis cuts it lengthwise; a plane through
-//! several holes of a body makes disks of it at once. The candidate with the fewest faults of topology, then
-//! of shape, wins.
+//! Voronoi cells of two far points. A plane that contains a limb's axis cuts it lengthwise. A plane through
+//! several holes of a body makes disks of it at once. The candidate with the fewest faults of topology wins,
+//! then the one with the best shape.
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
@@ -17,15 +17,15 @@ use super::refine::Ground;
 use crate::seam::{seam_half_edges, stretches};
 use crate::{ContactGraph, LatticeDirection, PatchId};
 
-/// What one fault of topology weighs against shape: more than the worst shape.
+/// Cost of one fault of topology relative to shape: more than the worst shape.
 const FAULT: f64 = 4.0;
-/// What areas of x : 1 weigh: the squared difference over the sum; 1 at worst.
+/// Cost of uneven halves: the weight of the squared relative difference of their areas, which is 1 at worst.
 const UNEVENNESS: f64 = 1.5;
-/// What the new seam weighs, in roots of the patch's area: 1 for a square cut along its side.
+/// Cost of a new seam as long as the root of the patch's area, such as a square cut along its side.
 const SEAM_LENGTH: f64 = 0.3;
 
-/// Most parts around a patch for which seams through two of them at once are tried, as their number grows
-/// with the square.
+/// Greatest number of parts around a patch for which seams through two of them at once are tried, as their
+/// number grows with the square.
 const MOST_PAIRED: usize = 10;
 
 /// A labelled mesh whose patches can be divided.
@@ -33,27 +33,27 @@ pub(super) struct Divider<'a> {
     pub mesh: &'a TriMesh,
     pub topology: &'a Topology,
     pub faces: &'a DualGraph,
-    /// What no division parts.
+    /// Sets of faces that no division may part.
     pub whole: &'a Whole,
     pub min_piece_mm2: f64,
 }
 
-/// A way to divide a patch: the triangles of the part that gets a new number.
+/// A possible division of a patch.
 pub(super) struct Division {
     pub cost: f64,
-    /// What is wrong with the topology afterwards.
+    /// Number of faults of the topology after the division.
     pub n_faults: f64,
     pub moved: Vec<u32>,
 }
 
 /// Divides `patch` into two connected halves of similar area by a short seam, mostly across its longest
-/// direction; the new half gets the number `labels.n_patches()`. `None` where the patch is one triangle, or
-/// is not there.
+/// direction. The new half gets the number `labels.n_patches()`. `None` if the patch is a single triangle or
+/// does not exist.
 pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
     split_keeping(&Ground::new(solid), labels, patch)
 }
 
-/// The same where no set that `ground` keeps whole is parted.
+/// Divides like [`split_piece`], without parting any set that `ground` keeps whole.
 pub(super) fn split_keeping(ground: &Ground<'_>, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
     let divider = Divider {
         mesh: ground.solid.mesh(),
@@ -75,8 +75,8 @@ pub(super) fn split_keeping(ground: &Ground<'_>, labels: &FaceLabels, patch: Pat
 }
 
 impl Divider<'_> {
-    /// The cheapest division of `patch`. `pairs` are far points that Voronoi halves are tried with, and `faults`
-    /// counts what else is wrong with a labelling, given with the seams inside the patch; infinite forbids it.
+    /// Cheapest division of `patch`. `pairs` are far points for Voronoi halves. `faults` counts the other
+    /// faults of a labelling, given with the seams inside the patch; an infinite count forbids it.
     pub fn best(
         &self,
         label: &[u32],
@@ -109,8 +109,8 @@ impl Divider<'_> {
         divisions.into_iter().flatten().reduce(cheaper)
     }
 
-    /// The halves that come of giving `moved` to the second of `halves` once both are connected; `label` is left
-    /// as they are. `None` where that is no division, or one that `faults` forbids.
+    /// Division that gives `moved` to the second of `halves` and then makes both connected; `label` is left
+    /// with the new labels. `None` if the result is no division, or one that `faults` forbids.
     fn division(
         &self,
         label: &mut [u32],
@@ -157,7 +157,7 @@ impl Divider<'_> {
         })
     }
 
-    /// The half-edges between `members` and the patch `other`, which has a higher number.
+    /// Half-edges between `members` and the patch `other`, which has a higher number.
     fn seam_beside(&self, label: &[u32], members: &[u32], other: u32) -> Vec<HalfEdge> {
         let mut seam = seam_half_edges(self.topology, label, members.iter().copied());
         seam.retain(|&h| label[self.topology.opposite(h) as usize / 3] == other);
@@ -169,8 +169,8 @@ impl Divider<'_> {
         self.mesh.points[a as usize].distance(self.mesh.points[b as usize])
     }
 
-    /// Triangles on the positive side of planes through the middle, normal to the 13 lattice directions of
-    /// the principal frame.
+    /// Triangles on the positive side of planes through the middle. The planes are normal to the 13 lattice
+    /// directions of the principal frame.
     fn plane_halves(&self, members: &[u32]) -> impl Iterator<Item = Vec<u32>> {
         let area: f64 = members.iter().map(|&f| self.faces.area[f as usize]).sum();
         let weighted = |f: u32| self.faces.center[f as usize] * self.faces.area[f as usize];
@@ -191,8 +191,9 @@ impl Divider<'_> {
             })
     }
 
-    /// What is nearer to the second point of each pair; also of the two ends of the patch. For every two
-    /// pairs also what is nearer to one point of each than to the others: a seam through two limbs at once.
+    /// Triangles nearer to the second point of each pair, and of the two ends of the patch, than to the
+    /// first. Every two pairs also give triangles nearer to one point of each than to the others: a seam
+    /// through two limbs at once.
     fn voronoi_halves(&self, label: &[u32], members: &[u32], pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
         let patch = label[members[0] as usize];
         let inside = |f: u32| label[f as usize] == patch;
@@ -214,7 +215,7 @@ impl Divider<'_> {
         let end = farthest_from(members[0]);
         let ends = [end, farthest_from(end)];
         let mut sources: Vec<Vec<u32>> = pairs.iter().chain([&ends]).map(|p| p.to_vec()).collect();
-        // With two parts in all, the rest and what hangs, one seam is all there is to go through.
+        // With two parts in all, there is only one seam to go through.
         for (i, p) in pairs
             .iter()
             .enumerate()
@@ -240,7 +241,7 @@ impl Divider<'_> {
             .collect()
     }
 
-    /// Makes both halves connected: what is not in the largest part of its half joins the other one.
+    /// Makes both halves connected: triangles outside the largest part of their half join the other half.
     fn join_islands(&self, label: &mut [u32], members: &[u32], halves: [u32; 2]) {
         for side in 0..2 {
             let (own, other) = (halves[side], halves[1 - side]);
@@ -272,8 +273,8 @@ impl Divider<'_> {
     }
 }
 
-/// The triangles of one patch, their corners numbered among themselves: what is asked of its halves costs what
-/// the patch has, not what the model has.
+/// The triangles of one patch, with their corners renumbered. The cost of a test of its halves then depends
+/// on the patch, not on the model.
 struct Region<'a> {
     faces: &'a [u32],
     corners: Vec<[u32; 3]>,
@@ -294,7 +295,7 @@ impl<'a> Region<'a> {
         }
     }
 
-    /// [`euler_characteristics`] of two halves that together are the patch.
+    /// Computes the [`euler_characteristics`] of two halves that make up the patch.
     fn euler_characteristics(&self, topology: &Topology, label: &[u32], halves: [u32; 2]) -> [i64; 2] {
         const UNSEEN: u8 = 2;
         const BORDER: u8 = 3;
@@ -322,8 +323,8 @@ impl<'a> Region<'a> {
     }
 }
 
-/// Corners − edges + triangles of each patch, its border included: 1 for a disk, 0 for a ring, 2 for a closed
-/// surface.
+/// Euler characteristic of each patch, corners − edges + triangles with its border: 1 for a disk, 0 for a
+/// ring, 2 for a closed surface.
 pub(super) fn euler_characteristics(
     mesh: &TriMesh,
     topology: &Topology,
@@ -354,7 +355,7 @@ pub(super) fn euler_characteristics(
     doubled.into_iter().map(|d| d / 2).collect()
 }
 
-/// The graph of contacts of a labelling whose seams zigzag along triangles.
+/// Contact graph of a labelling whose seams zigzag along triangle edges.
 pub(super) fn raw_contact_graph(
     divider: &Divider<'_>,
     label: &[u32],
@@ -374,15 +375,15 @@ mod tests {
     use super::*;
     use crate::testing::sphere;
 
-    /// Halves of a patch, by any labelling of its triangles, have the characteristics that the whole surface has
-    /// them with.
+    /// Halves of a patch, by any labelling of its triangles, have the same characteristics as in the whole
+    /// surface.
     #[test]
     fn halves_have_the_characteristics_that_all_patches_have() {
         let ball = Solid::new(sphere(3, Vec3::ONE)).expect("closed");
         let (mesh, topology) = (ball.mesh(), Topology::new(&ball));
         let n_faces = mesh.triangles.len() as u32;
         for step in [2u32, 3, 5, 7, 11] {
-            // A cap, and within it what a stride marks: islands, pinched points, rings.
+            // The stride marks islands, pinched points and rings within a cap.
             let in_cap = |f: u32| mesh.face_center(f as usize).z > -0.3;
             let members: Vec<u32> = (0..n_faces).filter(|&f| in_cap(f)).collect();
             let half = |f: u32| u32::from((f / step).is_multiple_of(3)) * 2;

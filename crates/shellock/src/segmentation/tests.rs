@@ -7,7 +7,7 @@ fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
     run(&Ctx::quiet())
 }
 
-/// What was made, and what was warned of.
+/// Runs `run` and returns its result with the warnings.
 fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<crate::Warning>) {
     let ctx = Ctx::quiet();
     (run(&ctx), ctx.into_warnings())
@@ -36,7 +36,7 @@ fn limbed() -> Solid {
     .unwrap()
 }
 
-/// One label for each arm's triangles and 0 for the body: the arms hang on the body alone.
+/// One label for each arm's triangles and 0 for the body, which is the only link between the arms.
 fn arm_labels(solid: &Solid) -> Vec<i64> {
     let mesh = solid.mesh();
     (0..mesh.triangles.len())
@@ -105,7 +105,7 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
     assert_patches_are_connected(&surface);
 }
 
-/// Segments the arms' labels with limits between which a seam half round an arm lies.
+/// Segments the arms' labels. A seam half round an arm lies between the two limits on contacts.
 fn segment_thin_arms(least_contact_mm: f64) -> (SegmentationParams, SegmentedSurface, Vec<crate::Warning>) {
     let solid = limbed();
     let params = SegmentationParams {
@@ -309,7 +309,7 @@ fn people_s_methods_make_a_part_of_each_arm() {
         let found = by(method, &solid);
         let mut parts = std::collections::BTreeSet::new();
         for arm in [-3, 100, 12, 13] {
-            // The tip of the arm: its farthest face.
+            // The tip of the arm is its farthest face.
             let tip = (0..arm_of_face.len())
                 .filter(|f| arm_of_face[*f] == arm)
                 .max_by(|a, b| {
@@ -356,7 +356,7 @@ fn ball(center_mm: [f64; 3], radius_mm: f64) -> KeepWhole {
     KeepWhole::Sphere { center_mm, radius_mm }
 }
 
-/// The share of the area within a ball that is in one piece.
+/// Share of the area within a ball that lies in one piece.
 fn share_in_one_piece(surface: &SegmentedSurface, center_mm: [f64; 3], radius_mm: f64) -> f64 {
     let mut area = vec![0.0; surface.n_patches];
     for (face, patch) in surface.patch_of_face.iter().enumerate() {
@@ -476,7 +476,7 @@ fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
     assert_eq!(bad.problems().len(), 1);
 }
 
-/// The arms are about the same on both sides of x = 0, and of the plane between y and z.
+/// The arms are nearly symmetric about x = 0, and about the plane between y and z.
 #[test]
 fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
     let solid = limbed();

@@ -7,20 +7,19 @@ use shellock_geom::{Solid, Topology, TriMesh};
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::{Cause, Ctx, PatchId, Warning};
 
-/// Fewest triangles of a patch on average, and of each patch.
+/// Least number of triangles of a patch, both on average and for each patch.
 const MIN_FACES: usize = 3;
-/// Most patches that ids and planning are made for.
+/// Greatest number of labels that ids and planning support.
 const MAX_LABELS: usize = 1000;
-/// A part apart from the rest of its label is an island below this share of the label's area, and a piece of
-/// its own above.
+/// Least share of the label's area for a separate part to become a piece of its own. A smaller part is an
+/// island.
 const ISLAND_SHARE: f64 = 0.1;
 
-/// Patches from one label a triangle: numbered without gaps in order of the labels, each connected and large
-/// enough.
+/// Makes patches from one label for each triangle. They are numbered without gaps in order of the labels, and
+/// each is connected and large enough.
 ///
-/// Parts of a label far apart become pieces of their own (`label-split`), islands (`label-island`, one
-/// warning for all) and patches that are too small (`label-merged`) join the neighbour with the longest
-/// common seam.
+/// Distant parts of a label become pieces of their own (`label-split`). Islands (`label-island`, one warning
+/// for all) and patches that are too small (`label-merged`) join the neighbour with the longest common seam.
 pub fn user_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -68,7 +67,7 @@ pub fn user_labels(
     Ok(cleaned)
 }
 
-/// Connected parts of labels, and which of them have been merged into which.
+/// Connected parts of labels, which may be merged.
 struct Parts<'a> {
     mesh: &'a TriMesh,
     topology: &'a Topology,
@@ -150,8 +149,8 @@ impl<'a> Parts<'a> {
         let is_small = |parts: &Self, p: usize| {
             parts.n_faces[p] > 0 && (parts.area[p] < params.min_piece_mm2 || parts.n_faces[p] < MIN_FACES)
         };
-        // Each merge leaves one part fewer, so this ends; the smallest goes first and may make its neighbour
-        // large enough.
+        // Each merge leaves one part fewer, so this ends. The smallest part comes first and may make its
+        // neighbour large enough.
         while let Some(part) = (0..self.area.len())
             .filter(|&p| is_small(self, p))
             .min_by(|&p, &q| self.area[p].total_cmp(&self.area[q]))
@@ -170,7 +169,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Gives `part` to the neighbour with the longest common seam; false where it has none.
+    /// Merges `part` into the neighbour with the longest common seam. Returns false if it has no neighbour.
     fn merge(&mut self, part: usize) -> bool {
         let mut shared_mm = vec![0.0; self.area.len()];
         for h in 0..self.topology.n_half_edges() as u32 {

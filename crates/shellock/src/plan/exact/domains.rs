@@ -1,18 +1,18 @@
-//! What is still possible under a limit on the cost of each piece, and its propagation.
+//! Plans that are still possible under a limit on the cost of each piece, and constraint propagation.
 //!
-//! Unknown are the role of each piece (its direction, or being the first) and which piece of each seam is
-//! later. A plan is also an order, of which only what must be is kept: who leaves before whom, closed under
-//! transitivity, so that orders which differ in pieces that do not touch are never told apart. Revising a
-//! piece strikes out what cannot be:
+//! The unknowns are the role of each piece (its direction, or being the first) and the later piece of each
+//! seam. A plan is also an order, of which only the necessary part is kept: the pieces that must leave before
+//! each other, closed under transitivity. So orders that differ in pieces that do not touch are never
+//! distinguished. Revising a piece removes what is impossible:
 //!
-//! 1. order and seams agree: who leaves first of two neighbours is the later installed one;
+//! 1. order and seams agree: the neighbour that leaves first is the one installed later;
 //! 2. no direction runs into a piece that leaves afterwards;
-//! 3. each piece but the key hangs on a later one, each but the first on an earlier one;
+//! 3. each piece but the key joins a later one, each but the first an earlier one;
 //! 4. the cost stays under the limit with the best of all other seams ([`PieceCosts::narrow`]).
 //!
-//! When nothing more changes, two relaxed tests of the whole follow: what must still be there when a piece
-//! leaves hangs together by pieces that may be there, and the assembly locks (the cluster test) if all that
-//! is open turns out well.
+//! When nothing changes any more, two relaxed tests of the whole assembly follow. First, the pieces that must
+//! remain when a piece leaves are connected through pieces that may remain. Second, the assembly locks (the
+//! cluster test) if everything still open turns out well.
 //!
 //! [`PieceCosts::narrow`]: crate::plan::PieceCosts::narrow
 
@@ -24,12 +24,12 @@ use super::super::space::Space;
 use crate::plan::PieceSet;
 use crate::{LatticeDirection, PatchId};
 
-/// What is still possible.
+/// The possibilities that are still left.
 #[derive(Clone)]
 pub(super) struct Domains {
-    /// By piece.
+    /// Possible roles of each piece.
     pub roles: Vec<RoleSet>,
-    /// By contact: directions with its piece `a` later, and with `b` later.
+    /// Possible directions of each contact: with its piece `a` later, and with `b` later.
     pub seams: Vec<[DirectionMask; 2]>,
     /// Pieces that leave before each piece.
     pub before: Vec<PieceSet>,
@@ -37,21 +37,21 @@ pub(super) struct Domains {
     pub after: Vec<PieceSet>,
 }
 
-/// Nothing is possible; the piece at which that showed.
+/// Proof that nothing is possible, with the piece at which that showed.
 pub(super) struct Conflict(pub PatchId);
 
 /// Revises pieces until nothing changes.
 pub(super) struct Propagator<'a> {
     pub space: &'a Space<'a>,
     key: &'a KeyChoice,
-    /// By contact: directions with a joint that holds, with `a` later and with `b` later.
+    /// Directions with a joint that holds, by contact: with `a` later, and with `b` later.
     holding: Vec<[DirectionMask; 2]>,
-    /// Pieces whose cost was asked for: the measure of work.
+    /// Number of pieces whose cost was evaluated: the measure of work.
     pub n_revisions: usize,
-    /// Pieces to revise.
+    /// Pieces still to revise.
     dirty: PieceSet,
-    /// Pieces whose cost is to be asked for again. A longer list of who remains alone is no reason: it
-    /// changes little.
+    /// Pieces whose cost must be evaluated again. More remaining pieces alone are no reason, since they
+    /// change little.
     is_cost_open: PieceSet,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Propagator<'a> {
         }
     }
 
-    /// All that can be with this key.
+    /// All possibilities with this key.
     pub fn all(&self) -> Domains {
         let (n, key) = (self.space.n, self.key.piece);
         let of_key = self.key.directions.iter().fold(0, |mask, &s| mask | mask_of(s));
@@ -102,7 +102,7 @@ impl<'a> Propagator<'a> {
         }
     }
 
-    /// Strikes out what cannot be, beginning with `changed`.
+    /// Removes what is impossible, starting with the pieces `changed`.
     pub fn propagate(&mut self, d: &mut Domains, changed: PieceSet, limit: f64) -> Result<(), Conflict> {
         self.dirty = changed;
         self.is_cost_open = changed;
@@ -133,8 +133,8 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Sides of contact `i` in `Domains::seams`: that with `p` later, that with the other later, and the
-    /// other.
+    /// Indices into the sides of contact `i` in `Domains::seams`, with `p` later and with the other piece
+    /// later, and the other piece.
     fn sides(&self, i: usize, p: PatchId) -> (usize, usize, PatchId) {
         let c = &self.space.survey.contacts[i];
         let own = usize::from(p != c.a);
@@ -175,7 +175,7 @@ impl<'a> Propagator<'a> {
         }
     }
 
-    /// `x` leaves before `y`.
+    /// Requires that `x` leaves before `y`.
     pub fn order(&mut self, d: &mut Domains, x: PatchId, y: PatchId) -> Result<(), Conflict> {
         if d.before[usize::from(y)].contains(x) {
             return Ok(());
@@ -195,7 +195,7 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Lets order, seams and roles of `p` agree.
+    /// Makes the order, the seams and the roles of `p` agree.
     fn orient(&mut self, d: &mut Domains, p: PatchId) -> Result<(), Conflict> {
         let at = usize::from(p);
         let space = self.space;
@@ -224,7 +224,7 @@ impl<'a> Propagator<'a> {
         roles.may_be_first &= d.after[at].is_empty();
         self.set_roles(d, p, roles)?;
         if roles.separations == 0 {
-            // The first piece leaves after all others.
+            // The first-installed piece leaves after all others.
             for q in space.all().minus(PieceSet::one(p)).iter() {
                 self.order(d, q, p)?;
             }
@@ -232,8 +232,8 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Keeps directions that no piece blocks which leaves afterwards; who blocks all that are left leaves
-    /// before.
+    /// Keeps directions that are not blocked by a piece that leaves afterwards. A piece that blocks all
+    /// remaining directions must leave before `p`.
     fn leave_freely(&mut self, d: &mut Domains, p: PatchId) -> Result<(), Conflict> {
         let at = usize::from(p);
         let mut roles = d.roles[at];
@@ -255,7 +255,7 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Keeps directions with a joint to an earlier piece, and a joint to a later one.
+    /// Keeps directions with a joint to an earlier piece, and requires a joint to a later one.
     fn join(&mut self, d: &mut Domains, p: PatchId) -> Result<(), Conflict> {
         let space = self.space;
         let mut joining = 0;
@@ -305,7 +305,7 @@ impl<'a> Propagator<'a> {
         self.set_roles(d, p, roles)
     }
 
-    /// What is known around `p`.
+    /// Knowledge about the surroundings of `p`.
     pub fn surroundings(&self, d: &Domains, p: PatchId) -> Surroundings {
         let seam = |&i: &usize| {
             let (own, others, _) = self.sides(i, p);
@@ -321,7 +321,7 @@ impl<'a> Propagator<'a> {
         }
     }
 
-    /// Exactly one piece is the first.
+    /// Requires that exactly one piece is the first.
     fn one_first(&mut self, d: &mut Domains) -> Result<(), Conflict> {
         let may: Vec<usize> = (0..self.space.n).filter(|&p| d.roles[p].may_be_first).collect();
         let Some(&p) = may.first() else {
@@ -333,7 +333,8 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// What certainly remains when a piece leaves must hang together, if only by what may remain.
+    /// Requires that the pieces that certainly remain when a piece leaves are connected, if only through
+    /// pieces that may remain.
     fn rests_hang_together(&self, d: &Domains) -> Result<(), Conflict> {
         for p in (0..self.space.n).map(PatchId::from) {
             let surely = d.after[usize::from(p)];
@@ -349,7 +350,7 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// The cluster test with every open seam as firm as it can become.
+    /// Runs the cluster test with every open seam as firm as it can become.
     fn may_lock(&self, d: &Domains) -> Result<(), Conflict> {
         let n = self.space.n;
         let key = self.key.piece;

@@ -1,4 +1,4 @@
-//! From decided directions and seams to an order in which every condition holds.
+//! An assembly order that satisfies every condition, from decided directions and seams.
 
 use std::collections::HashSet;
 
@@ -7,15 +7,15 @@ use super::domains::Domains;
 use crate::plan::{LatticePlan, LatticeStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
 
-/// Sets of remaining pieces looked at before the question is left open.
+/// Sets of remaining pieces to examine before the question is left open.
 const MOST_SETS: usize = 4000;
 
-/// What came of it.
+/// Result of the search for an order.
 pub(super) enum Sequence {
     Plan(LatticePlan),
-    /// There is no such order.
+    /// No such order exists.
     None,
-    /// Too many to try.
+    /// Too many orders to try.
     Unknown,
 }
 
@@ -25,11 +25,11 @@ struct Sequencer<'a> {
     limit: f64,
     separations: Vec<LatticeDirection>,
     removed: Vec<LatticeStep>,
-    /// What was left where no order was found; only asked for membership.
+    /// Sets of remaining pieces from which no order was found; used only for membership tests.
     dead: HashSet<PieceSet>,
 }
 
-/// An order that `d`, with one role a piece and one state a seam, leaves open.
+/// Finds an order compatible with `d`, in which each piece has one role and each seam one state.
 pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
     let separation = |p: usize| {
         let outwards = LatticeDirection::nearest(space.survey.mean_normal[PatchId::from(p)]);
@@ -57,7 +57,7 @@ pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
     }
     s.removed.reverse();
     let plan = LatticePlan { steps: s.removed };
-    // Relations are the same for all orders, so one that is turned down speaks for all.
+    // Relations are the same for all orders, so if one is rejected, all are.
     if space.allows(&plan) {
         Sequence::Plan(plan)
     } else {

@@ -1,9 +1,9 @@
-//! How firmly a contact resists the pushes of the verification, estimated before anything is built.
+//! Hold of a contact against the pushes of the verification, estimated before anything is built.
 //!
-//! The finished kit is judged by pushing every piece a small step in 66 directions; a push must run into the
-//! other pieces. Here the overlap is estimated from the seam samples that carry connectors. In the
-//! cross-section of a connector, with ŝ the direction in which the male leaves and `n` perpendicular to it, a
-//! motion `m` of the male meets
+//! The verification pushes every piece of the finished kit a small step in 66 directions. Each push must run
+//! into the other pieces. Here the overlap is estimated from the seam samples that carry connectors. In the
+//! cross-section of a connector, let ŝ be the direction in which the male leaves and `n` the perpendicular to
+//! it. A motion `m` of the male then meets
 //!
 //! ```text
 //!   along ±n:  a side of the channel   (|m·n| − c) · pin depth
@@ -11,10 +11,11 @@
 //!   along +ŝ:  nothing
 //! ```
 //!
-//! (a rail under a seam along s holds along ±N alone), and the walls where the later piece is pushed at the
+//! A rail under a seam along s holds along ±N alone. Walls resist as well if the later piece is pushed at the
 //! earlier one across a seam that does not lean.
 //!
-//! Limits: carving and obstructions shorten runs, which one factor stands for; ends of runs resist nothing here.
+//! Limits: carving and obstructions shorten runs, which a single factor accounts for; ends of runs resist
+//! nothing here.
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
@@ -25,26 +26,25 @@ use crate::plan::PlanParams;
 use crate::push::{self, N_PUSHES};
 use crate::{LatticeDirection, PatchId};
 
-/// Gap between walls, mm, and height of the wall that counts: half of the usual 2 mm, since walls are rounded
-/// and carved.
+/// Gap between walls, mm, and height of the wall that counts, mm: half of the usual 2 mm, since walls are
+/// rounded and carved.
 const WALL_GAP_MM: f64 = 0.1;
 const WALL_HEIGHT_MM: f64 = 1.0;
 
-/// Share of the estimate that is counted: carving takes 10 to 30 % of the joints, and their ends are cut
-/// short.
+/// Share of the estimate that counts: carving removes 10 to 30 % of the joints, and their ends are shortened.
 const LEFT_SHARE: f64 = 0.6;
 
-/// What one order and direction of a contact holds, mm³ by push: when the later piece is pushed, and the
+/// Hold of a contact in one order and direction, mm³ for each push: first of the later piece, then of the
 /// earlier one.
 pub type Pushes = [[f32; N_PUSHES]; 2];
 
-/// Estimates for both orders and all directions.
+/// Hold estimates of one contact for both orders and all directions.
 #[derive(Clone, Debug, Default)]
 pub struct BlockingTable(Vec<Pushes>);
 
 impl BlockingTable {
-    /// The table of a contact between `pair` with these seams and connectors of `size_mm`; `holds(order, s)`
-    /// is whether its runs are long enough there.
+    /// Builds the table of a contact between `pair` with these seams and connectors of `size_mm`.
+    /// `holds(order, s)` tells if its runs are long enough there.
     pub(super) fn new(
         params: &PlanParams,
         size_mm: f64,
@@ -74,7 +74,7 @@ impl BlockingTable {
         Self(table.collect())
     }
 
-    /// A table out of nothing; `held` gives mm³.
+    /// A made-up table for tests; `held` gives mm³.
     #[cfg(test)]
     pub fn made_up(mut held: impl FnMut() -> f32) -> Self {
         Self(
@@ -84,14 +84,14 @@ impl BlockingTable {
         )
     }
 
-    /// What the contact holds; `order` is 0 where the piece with the lower id is later. `None` where nothing
-    /// was measured.
+    /// Hold of the contact; `order` is 0 if the piece with the lower id is later. `None` if nothing was
+    /// measured.
     pub fn pushes(&self, order: usize, s: LatticeDirection) -> Option<&Pushes> {
         self.0.get(order * LatticeDirection::COUNT + s.index())
     }
 }
 
-/// Adds what the connector at `x` holds, mm³.
+/// Adds the hold of the connector at `x`, mm³.
 fn add(
     params: &PlanParams,
     size_mm: f64,
@@ -102,7 +102,7 @@ fn add(
 ) {
     let (side, s) = (way.side, way.s.unit());
     let (gap, step) = (params.clearance_mm, push::length_mm(params.clearance_mm));
-    // The male leaves along +s if it is the later piece, else along −s; so does the sign of its motion.
+    // The male leaves along +s if it is the later piece, else along −s. Its motion changes sign likewise.
     let role = if s.dot(x.normal) >= 0.0 { 1.0 } else { -1.0 };
     let leaves = (role * s).reject_from_normalized(x.tangent).normalize_or_zero();
     let n = leaves.cross(x.tangent);

@@ -1,7 +1,7 @@
-//! Which connectors of a pair would have the other piece's wall in their way.
+//! Connectors of a pair that the other piece's wall would obstruct.
 //!
-//! Below the wall, half a connector deep, each piece has its half. The later piece's half must not meet the
-//! earlier piece on its way out; nor may the later piece's far wall sweep over the earlier piece's half:
+//! Below the wall, half a connector deep, each piece has its half. The later piece's half must not hit the
+//! earlier piece on its way out. Nor may the later piece's far wall sweep over the earlier piece's half:
 //!
 //! ```text
 //!   ─────a──────┬──────b─────        a later, leaving along s: blocked where
@@ -10,8 +10,8 @@
 //!   ─────a─────────────b─────        as b's channel reaches to x_a if a has the pin, from x_a along −s a
 //! ```
 //!
-//! Round thin limbs, where the far wall is near, this leaves little more than the limb's axis. Limits: only
-//! the two pieces of the seam are looked at, as the order of the others is not known yet.
+//! Round thin limbs, where the far wall is near, little more than the limb's axis remains as a direction.
+//! Limits: only the two pieces of the seam are checked, since the order of the others is not known yet.
 
 use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
@@ -19,19 +19,19 @@ use shellock_geom::bvh::TriangleBvh;
 use crate::plan::PlanParams;
 use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
-/// Where a half connector is looked at, in connector sizes: below the wall and beside the seam.
+/// Position at which a half connector is checked, in connector sizes: below the wall and beside the seam.
 const DEPTH_SIZES: f64 = 0.5;
 const BESIDE_SIZES: f64 = 0.5;
-/// The wall above the connector is no obstacle: what the ray meets within this multiple of the distance to a
-/// flat one.
+/// The wall above the connector is no obstacle: hits within this multiple of the distance to a flat wall do
+/// not count.
 const LOCAL_WALL: f64 = 1.3;
 /// Least cosine between a ray and the surface normal at which the ray leaves through the wall above.
 const LEAVES_ABOVE: f64 = 0.3;
-/// Share of a wall's thickness at which a point counts as below it, and the number of moves from wall to wall
-/// after which the search for such a point ends.
+/// Share of the wall thickness at which a point counts as below a wall. The search for such a point ends
+/// after this number of moves from wall to wall.
 const ENOUGH_WALL: f64 = 0.95;
 const MOST_MOVES: usize = 8;
-/// Walls that a ray is followed through, and the step past each, mm.
+/// Greatest number of walls that a ray is followed through, and step past each, mm.
 const MOST_WALLS: usize = 8;
 const PAST_WALL_MM: f64 = 0.01;
 
@@ -43,19 +43,19 @@ pub(super) struct Obstructions<'a> {
     far_mm: f64,
 }
 
-/// A bit for each order (0 where the piece with the lower id is later) and direction that is blocked.
+/// One bit for each blocked pair of an order (0 if the piece with the lower id is later) and a direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Blocked(u64);
 
 impl Blocked {
-    /// Whether the later piece cannot leave along `s` with a connector here.
+    /// Returns true if the later piece cannot leave along `s` with a connector here.
     pub fn has(self, order: usize, s: LatticeDirection) -> bool {
         self.0 >> (order * LatticeDirection::COUNT + s.index()) & 1 == 1
     }
 }
 
 impl<'a> Obstructions<'a> {
-    /// `None` where walls have no thickness, so that there is no room to look at.
+    /// Prepares the surface for rays. `None` if walls have no thickness, so that there is no room to check.
     pub fn new(params: &PlanParams, surface: &'a SegmentedSurface) -> Option<Self> {
         (params.wall_mm > 0.0).then(|| Self {
             surface,
@@ -65,8 +65,8 @@ impl<'a> Obstructions<'a> {
         })
     }
 
-    /// Moves `point` to the inner side of all walls. It lies below one wall by the wall's thickness, but may be
-    /// nearer to another, as below an edge of the model. `None` if the walls leave no cavity.
+    /// Moves `point` to the inner side of all walls. The point lies below one wall by the wall's thickness,
+    /// but may be nearer to another, as below an edge of the model. `None` if the walls leave no cavity.
     pub fn at_depth(&self, mut point: Vec3) -> Option<Vec3> {
         for _ in 0..MOST_MOVES {
             let limit_mm = ENOUGH_WALL * self.wall_mm;
@@ -82,8 +82,8 @@ impl<'a> Obstructions<'a> {
         None
     }
 
-    /// What obstructs a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across`
-    /// leads from a to b.
+    /// Orders and directions in which a connector of `size_mm` between `a` and `b` is obstructed. The
+    /// connector lies below `point` of the outer surface; `across` leads from a to b.
     pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Blocked {
         let height_mm = self.wall_mm + DEPTH_SIZES * size_mm;
         let below = point - height_mm * normal;
@@ -99,14 +99,14 @@ impl<'a> Obstructions<'a> {
         for s in LatticeDirection::all() {
             let (on, back) = (s.index(), s.opposite().index());
             let later_is_male = s.unit().dot(normal) >= 0.0;
-            // By order: what the later and the earlier piece's side see, and which of the two patches they
-            // are.
+            // For each order: hits from the later and from the earlier piece's side, and the indices of the
+            // two patches.
             for (order, (later, earlier, own, other)) in [(&from_a, &from_b, 0, 1), (&from_b, &from_a, 1, 0)]
                 .into_iter()
                 .enumerate()
             {
-                // The channel reaches under the male's wall, so one of the halves is on the other's side as
-                // well.
+                // The channel reaches under the male's wall, so one of the halves lies on the other piece's
+                // side as well.
                 let channel = if later_is_male {
                     later[back][own]
                 } else {
@@ -120,8 +120,8 @@ impl<'a> Obstructions<'a> {
         Blocked(blocked)
     }
 
-    /// Which of two patches the ray from `origin`, so far below the surface, along `s` meets, the wall right
-    /// above not counted.
+    /// Tells for each of two patches if the ray along `s` hits it. The ray starts at `origin`, `height_mm`
+    /// below the surface; the wall right above does not count.
     fn met(
         &self,
         origin: Vec3,

@@ -1,8 +1,8 @@
-//! The inner edge of a seam's wall in steps of about a millimetre, and the runs of connectors that one order
-//! and direction of its pieces would have there.
+//! Samples of the inner edge of a seam's wall, in steps of about a millimetre, and the runs of connectors
+//! there for one order and direction.
 //!
-//! The edge is estimated from the outer surface: points of the seam go inwards by the thickness of the wall,
-//! and on until no other wall is nearer (below a sharp edge of the model). Lines, frames and rules are those
+//! The edge is estimated from the outer surface. Points of the seam move inwards by the wall thickness, and
+//! further until no other wall is nearer (below a sharp edge of the model). Lines, frames and rules are those
 //! of the connector stage.
 
 use shellock_geom::Vec3;
@@ -16,15 +16,16 @@ use crate::{LatticeDirection, PatchId, Seam};
 
 /// Distance between the points of a seam that are moved inwards, mm: below the size of any connector.
 const STEP_MM: f64 = 1.0;
-/// Points of the inner edge that are farther apart than so many steps have none in between.
+/// Greatest distance between neighbouring points of one inner edge, in steps. Beyond it the edge is
+/// interrupted.
 const FARTHEST_STEPS: f64 = 2.5;
 
-/// A place on the inner edge of the wall, in the frame of connectors.
+/// One place on the inner edge of the wall, in the frame of connectors.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
     pub tangent: Vec3,
     pub normal: Vec3,
-    /// Perpendicular to both, from the piece with the lower id to the other.
+    /// Unit vector perpendicular to both, from the piece with the lower id to the other.
     pub across: Vec3,
     /// Length of edge that the sample stands for, mm.
     pub length_mm: f64,
@@ -36,7 +37,7 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// The frame with the piece of the lower id as the later one where `side` is 1, else the other.
+    /// Frame of the seam. The piece with the lower id is the later one if `side` is 1, else the other.
     pub fn frame(&self, side: f64) -> SeamFrame {
         SeamFrame {
             tangent: self.tangent,
@@ -46,10 +47,10 @@ impl Sample {
     }
 }
 
-/// Order of a pair of pieces, and the direction in which the later one leaves.
+/// Order of a pair of pieces, and separation direction of the later one.
 #[derive(Clone, Copy)]
 pub(super) struct Way {
-    /// 1 where the piece with the lower id is later, else −1.
+    /// Order of the pair: 1 if the piece with the lower id is later, else −1.
     pub side: f64,
     pub s: LatticeDirection,
     /// True if the later piece is the key and slides on rails.
@@ -77,7 +78,7 @@ impl Way {
         x.has_room && !is_blocked() && x.frame(self.side).carries(self.s.unit())
     }
 
-    /// Weight of Eq. 4 at `x`; a rail is as good as a connector can be.
+    /// Weight of Eq. 4 at `x`; β on a rail, which is as good as a connector can be.
     pub fn weight(&self, x: &Sample, beta: f64) -> f64 {
         if self.has_rail(x) {
             beta
@@ -86,13 +87,13 @@ impl Way {
         }
     }
 
-    /// Direction perpendicular to the seam and to the way out, in which the sides of a pin face.
+    /// Direction that the sides of a pin face, perpendicular to the seam and to the separation direction.
     fn facing(&self, x: &Sample) -> Vec3 {
         x.tangent.cross(self.s.unit()).normalize_or_zero()
     }
 }
 
-/// A connector at one place.
+/// Kind of connector at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Rail,
@@ -100,7 +101,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Shortest run of it that is made, in connector sizes.
+    /// Shortest run of this kind that is made, in connector sizes.
     fn shortest_sizes(self) -> f64 {
         match self {
             Self::Rail => SHORTEST_RAIL_SIZES,
@@ -116,7 +117,7 @@ pub(super) struct Run {
     pub samples: Vec<usize>,
     /// Length of edge that its samples stand for, mm.
     pub length_mm: f64,
-    /// Length from the first to the last, mm: what can be swept.
+    /// Distance from the first sample to the last, mm: the length that can be swept.
     swept_mm: f64,
 }
 
@@ -134,13 +135,13 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The runs of connectors for one order and direction, however short. On a loop a run may reach past the
+    /// Runs of connectors for one order and direction, however short. On a loop, a run may continue from the
     /// last sample to the first.
     pub fn runs(&self, way: Way) -> Vec<Run> {
         let kinds = self.kinds(way);
         let n = kinds.len();
         let before = |i: usize| if i == 0 { n - 1 } else { i - 1 };
-        // A loop is walked from where a run starts, so that none is cut by the first sample.
+        // A loop is walked from the start of a run, so that the first sample cuts none.
         let start = (0..n).find(|&i| kinds[i].is_some() && kinds[before(i)] != kinds[i]);
         let first = start.filter(|_| self.is_loop).unwrap_or(0);
         let mut runs: Vec<Run> = Vec::new();
@@ -168,8 +169,8 @@ impl Line {
         runs
     }
 
-    /// Returns the kind of connector possible at each sample. None is possible beside a change of the male piece or
-    /// a sharp turn, because no profile can be swept over them.
+    /// Returns the kind of connector possible at each sample. None is possible beside a change of the male
+    /// piece or a sharp turn, because no profile can be swept over them.
     fn kinds(&self, way: Way) -> Vec<Option<Kind>> {
         let n = self.samples.len();
         let normals: Vec<Vec3> = self.samples.iter().map(|x| x.normal).collect();
@@ -178,7 +179,7 @@ impl Line {
         let fits = |i: usize, j: usize| {
             later_is_male[i] == later_is_male[j] && facing[i].dot(facing[j]) >= SHARPEST_TURN.cos()
         };
-        // Beyond the ends of an open line nothing turns.
+        // Nothing turns beyond the ends of an open line.
         let is_end = |i: usize| !self.is_loop && i == 0;
         let goes_on = |i: usize| is_end(i % n) || fits((i + n - 1) % n, i % n);
         let kind = |i: usize| {
@@ -233,8 +234,8 @@ pub(super) fn lines(
         .collect()
 }
 
-/// The connected rows of points, as indices, and whether each is a loop, whose first point comes last again.
-/// Neighbours in a row are no farther apart than `farthest_mm`.
+/// Connected rows of points, as indices, each with true if it is a loop. The first point of a loop is
+/// repeated at its end. Neighbours in a row are at most `farthest_mm` apart.
 fn edges(points: &[Option<Vec3>], is_loop: bool, farthest_mm: f64) -> Vec<(Vec<usize>, bool)> {
     let n = points.len();
     let is_joined = |i: usize, j: usize| match (points[i], points[j]) {
@@ -245,7 +246,7 @@ fn edges(points: &[Option<Vec3>], is_loop: bool, farthest_mm: f64) -> Vec<(Vec<u
     if is_loop && gap.is_none() {
         return vec![((0..n).collect(), true)];
     }
-    // The last point of a loop is its first: it is walked from a gap on, with that point once.
+    // The last point of a loop repeats its first. The loop is walked from a gap on, with that point once.
     let order = match gap.filter(|_| is_loop) {
         Some(gap) => (gap..n - 1).chain(0..gap).collect::<Vec<usize>>(),
         None => (0..n).collect(),
@@ -257,7 +258,7 @@ fn edges(points: &[Option<Vec3>], is_loop: bool, farthest_mm: f64) -> Vec<(Vec<u
         .collect()
 }
 
-/// The samples of one framed line between `pair`.
+/// Samples one framed line between `pair`.
 fn line(
     params: &PlanParams,
     size_mm: f64,
@@ -277,7 +278,7 @@ fn line(
     let step = |i: usize| arcs_mm.get(i + 1).map_or(0.0, |next| next - arcs_mm[i]);
     let sample = |i: usize| {
         let (tangent, normal) = (framed.tangents[i], framed.normals[i]);
-        // N × u points to the left, where the surface is seen from outside; there lies patch a.
+        // N × u points to the left as seen from outside, which is the side of patch a.
         let across = -normal.cross(tangent);
         let has_room = arcs_mm[i] >= end_mm && arcs_mm[i] <= total_mm - end_mm;
         let outside = framed.points[i] + params.wall_mm * normal;
@@ -313,7 +314,7 @@ mod tests {
 
     const SIZE_MM: f64 = 2.5;
 
-    /// The inner edges below a level seam through `points`, and the runs that are made where one piece leaves
+    /// Runs that are made on the inner edges below a level seam through `points`, if one piece leaves
     /// upwards.
     fn made_along(points: Vec<Vec3>) -> Vec<Run> {
         let seam = level_seam(points);
@@ -396,7 +397,7 @@ mod tests {
             rows(false),
             [(vec![0, 1], false), (vec![3, 4], false), (vec![5], false)]
         );
-        // A loop without a gap stays one; with one it is walked from there on.
+        // A loop without a gap stays a loop; with a gap, it is walked from there on.
         let ring = [at(0.0), at(1.0), at(0.5), at(0.0)];
         assert_eq!(edges(&ring, true, 2.5), [(vec![0, 1, 2, 3], true)]);
         let parted = [at(0.0), at(1.0), None, at(0.5), at(0.0)];

@@ -1,4 +1,4 @@
-//! What is ahead of faces that lie along a line: they slide in their own plane, edge on.
+//! Occlusion of faces parallel to a line, which slide edge on in their own plane.
 //!
 //! ```text
 //!   ──────p──────┬────q────┐          ──────p──────┐ q        each p slides to the right: q is in its way
@@ -12,19 +12,22 @@ use shellock_geom::topology::{HalfEdge, Topology};
 use super::Table;
 use crate::{PatchId, SegmentedSurface};
 
-/// Faces whose normals have no larger cosine with a line lie along it: on a way of 60 mm they rise by the
-/// 1.2 mm of skin that carving spares, so all of what slides there towards another wall would be lost.
+/// Greatest cosine between a line and the normal of a face that counts as parallel to it. Over 60 mm such a
+/// face rises by the 1.2 mm of skin that carving spares, so everything that slides towards another wall there
+/// would be lost.
 const ALONG_COS: f64 = 0.02;
-/// What is lost to another wall counts so many times: a strip 1 mm wide is a hole already, and where faces are
-/// merely shaded, carving finds a way around nearly as often.
+/// Weight of area that would be lost to another wall. A strip 1 mm wide already makes a hole, while carving
+/// often finds a way around faces that are merely occluded.
 const LOST_WEIGHT: f64 = 4.0;
-/// Faces that a walk passes, at most.
+/// Greatest number of faces that a walk passes.
 const MOST_STEPS: usize = 4096;
 
-/// Walks for one line, about: each stands for as much area, so that fine meshes of flat things cost no more.
+/// Approximate number of walks for one line. Each stands for the same area, so that fine meshes of flat
+/// shapes cost no more.
 const N_WALKS: f64 = 50_000.0;
 
-/// Adds faces along `s` to the tables of `s` and of its opposite: with their areas, since they are lost whole.
+/// Adds the faces parallel to `s` to the tables of `s` and of its opposite, with their true areas, since they
+/// are lost whole.
 pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tables: &mut [Table; 2]) {
     let lying: Vec<(usize, f64)> = (0..surface.patch_of_face.len())
         .filter_map(|face| {
@@ -35,7 +38,8 @@ pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tabl
         })
         .collect();
     let step_mm2 = lying.iter().map(|l| l.1).sum::<f64>() / N_WALKS;
-    // A walk starts where the area passed so far reaches another step, from the middle of one.
+    // A walk starts each time that the area passed so far reaches another step. The count starts at half a
+    // step.
     let mut passed = 0.5;
     for (face, area_mm2) in lying {
         let patch = usize::from(surface.patch_of_face[face]);
@@ -51,7 +55,7 @@ pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tabl
     }
 }
 
-/// Counts each patch that is ahead of a face on its `way` as occluding the area it stands for.
+/// Counts each patch ahead of a face on its `way` as occluding the area that the face stands for.
 fn count(
     surface: &SegmentedSurface,
     topology: &Topology,
@@ -72,13 +76,13 @@ fn count(
     }
 }
 
-/// A walk over faces along a direction, until the surface turns away from it; a face that turns towards it is
+/// A walk over faces along a direction, until the surface turns away from it. A face that turns towards it is
 /// the last.
 struct Walk<'a> {
     surface: &'a SegmentedSurface,
     topology: &'a Topology,
     along: Vec3,
-    /// The edge by which the present face was entered, if it was.
+    /// Edge through which the walk entered the present face, if any.
     entered: Option<HalfEdge>,
     face: usize,
     at: Vec3,
@@ -100,7 +104,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// By which half-edge the present face is left, and after how many mm.
+    /// Half-edge through which the walk leaves the present face, with the distance to it, mm.
     fn way_out(&self) -> Option<(HalfEdge, f64)> {
         let corners = self.surface.mesh.corners(self.face);
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -163,7 +167,7 @@ mod tests {
         let square =
             |z: f64| [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]].map(|[x, y]| Vec3::new(x, y, z));
         let box_of_two = Volume::loft(&[0.0, 20.0, 40.0].map(|z| square(z).to_vec())).to_mesh();
-        // Both lids go to a third patch, so that sides alone are asked for.
+        // Both lids go to a third patch, so that only the sides are tested.
         let surface = label(box_of_two, 3, |p| match p.z {
             z if !(1.0..=39.0).contains(&z) => 2,
             z => u32::from(z > 20.0),

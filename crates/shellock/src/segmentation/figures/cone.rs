@@ -1,43 +1,46 @@
-//! Where a piece's skin faces.
+//! Cone of directions that a piece's skin faces.
 
 use shellock_geom::Vec3;
 
 use serde::Serialize;
 
-/// Share of the area that a cone must hold: what is left out are rolled edges and noise.
+/// Share of the area that a cone must hold. The rest is rolled edges and noise.
 const HELD: f64 = 0.95;
 
-/// Steps of the search for the axis, rad: each is taken while it helps, then the next, half as long.
+/// Steps of the search for the axis, rad. Each is repeated while it improves the cone; then the next, half as
+/// long, follows.
 const STEPS_RAD: [f64; 7] = [0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625];
 
-/// Directions in which each step is tried.
+/// Number of directions in which each step is tried.
 const N_WAYS: usize = 8;
 
-/// Steps of one length that are taken at most.
+/// Greatest number of steps of one length.
 const MOST_STEPS: usize = 8;
 
-/// The narrowest cone of directions, as far as was found, that holds the normals of 95 % of a piece's skin.
+/// The narrowest cone found that holds the normals of 95 % of a piece's skin.
 ///
-/// Up to 90° the piece faces one way: nothing of that skin is undercut along the axis, so its own shape lets it
-/// leave along it, and it prints with that side up. What lies around it may still keep it.
+/// Up to 90° the piece faces one way: no part of that skin is undercut along the axis. So its own shape lets
+/// it leave along the axis, and it prints with that side up. Pieces around it may still block it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cone {
-    /// Unit vector.
+    /// Unit vector of the axis.
     pub axis: [f64; 3],
-    /// From the axis to the cone's side, [0, 180]°.
+    /// Angle from the axis to the cone's side, [0, 180]°.
     pub half_angle_deg: f64,
 }
 
 impl Cone {
-    /// Whether nothing of the skin that it holds is undercut along its axis.
+    /// Returns true if no part of the skin in the cone is undercut along its axis.
     pub fn is_one_way(&self) -> bool {
-        /// Where a half ball ends, its last triangles face level; more is a matter of rounding.
+        /// Greatest half angle of a piece that faces one way. The last triangles of a half ball face level;
+        /// more is a matter of rounding.
         const LEVEL_DEG: f64 = 90.0;
         self.half_angle_deg <= LEVEL_DEG
     }
 }
 
-/// Of a skin's normals, each with its area: a descent from the best of the mean normal and the axes.
+/// Finds the narrowest cone of a skin's normals, each given with its area. Descends from the best of the mean
+/// normal and the axes.
 pub(super) fn narrowest(skin: &[(Vec3, f64)]) -> Cone {
     let mean: Vec3 = skin.iter().map(|&(normal, area)| area * normal).sum();
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|a| [a, -a]);
@@ -69,7 +72,7 @@ pub(super) fn narrowest(skin: &[(Vec3, f64)]) -> Cone {
     }
 }
 
-/// Directions at `angle_rad` from `axis`, all around it.
+/// Directions at `angle_rad` from `axis`, evenly around it.
 fn tilted(axis: Vec3, angle_rad: f64) -> [Vec3; N_WAYS] {
     let (u, v) = axis.any_orthonormal_pair();
     std::array::from_fn(|i| {
@@ -78,7 +81,7 @@ fn tilted(axis: Vec3, angle_rad: f64) -> [Vec3; N_WAYS] {
     })
 }
 
-/// Cosine of the half angle of the cone around `axis` that holds the share; 1 where there is no area.
+/// Cosine of the half angle of the cone around `axis` that holds the required share; 1 if there is no area.
 fn least_dot(skin: &[(Vec3, f64)], axis: Vec3, ordered: &mut Vec<(f64, f64)>) -> f64 {
     ordered.clear();
     ordered.extend(skin.iter().map(|&(normal, area)| (normal.dot(axis), area)));

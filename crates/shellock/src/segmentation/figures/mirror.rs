@@ -1,4 +1,4 @@
-//! Whether a division is as symmetric as its model.
+//! Symmetry of a division compared with that of its model.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -6,8 +6,9 @@ use shellock_segment::symmetry::Plane;
 
 use crate::SegmentedSurface;
 
-/// Share of the area whose mirror image (the nearest point to it) lies in its piece's image: the piece that most of
-/// a piece's image lies in, where it is so the other way round, too.
+/// Share of the area whose mirror image lies in the image of its piece. A point's mirror image is the surface
+/// point nearest to it. A piece's image is the piece that holds most of its mirror image, if this holds the
+/// other way round, too.
 pub(super) fn mirrored_share(plane: &Plane, surface: &SegmentedSurface, bvh: &TriangleBvh) -> f64 {
     let (mesh, n) = (&surface.mesh, surface.n_patches);
     let beyond = |face: usize| {

@@ -1,4 +1,4 @@
-//! Where seams run: in creases or not, in sight or not.
+//! Course of the seams: in creases or not, visible or not.
 
 use std::f64::consts::TAU;
 
@@ -14,35 +14,36 @@ use crate::seam::seam_half_edges;
 /// Longest sample of a seam, mm: edges are divided into shorter ones.
 pub(super) const STEP_MM: f64 = 1.0;
 
-/// How far to each side of a seam the surface is looked at, mm: about a connector, which is also as much as the
-/// eye takes for one line at arm's length. Single edges say nothing, as a smoothed seam runs within triangles.
+/// Distance to each side of a seam at which the surface is measured, mm. This is about the size of a
+/// connector, and also the width that the eye takes for one line at arm's length. Single edges are no
+/// measure, since a smoothed seam runs within triangles.
 const BESIDE_MM: f64 = 3.0;
 
-/// Less bending than this, over both sides, is flat: a fillet of 17 mm.
+/// Least bend of a crease, over both sides, degrees. Less is flat: a fillet of 17 mm.
 pub(super) const CREASE_DEG: f64 = 10.0;
 
-/// Rays begin so far above the surface, mm: less than what a printer shows, more than rounding.
+/// Height of the start of rays above the surface, mm: less than a printer shows, more than rounding.
 const LIFT_MM: f64 = 0.02;
 
-/// Cosine of the angle at which a surface is seen so much from the side that its seam does not show: 1° of grazing.
+/// Least cosine between the surface normal and a view for a seam to be visible: 1° of grazing.
 const GRAZING: f64 = 0.02;
 
-/// Level views around the model.
+/// Number of level views around the model.
 const N_VIEWS: usize = 8;
 
-/// Triangles that a section passes at most, so that none goes round a mesh of specks without end.
+/// Greatest number of triangles that a section crosses, so that it ends on a mesh of tiny triangles.
 const MOST_CROSSED: usize = 10_000;
 
-/// A short stretch of seam.
+/// One short stretch of seam.
 struct Sample {
     length_mm: f64,
-    /// Positive in a hollow.
+    /// Bend of the surface; positive in a hollow.
     bend_deg: f64,
-    /// From each view, that of the front first.
+    /// Visibility from each view, the front first.
     is_seen: [bool; N_VIEWS],
 }
 
-/// All figures of the seams of `surface`, which stands with `up` upwards.
+/// Figures of all seams of `surface`, which stands with `up` upwards.
 pub(super) fn seam_figures(
     up: [f64; 3],
     surface: &SegmentedSurface,
@@ -80,7 +81,7 @@ pub(super) fn seam_figures(
     }
 }
 
-/// Towards the viewers, that of the front first.
+/// Directions towards the viewers, the front first.
 fn views(up: [f64; 3]) -> [Vec3; N_VIEWS] {
     let (up, front) = (Vec3::from(up), Vec3::from(front_of(up)));
     let aside = up.cross(front);
@@ -90,7 +91,7 @@ fn views(up: [f64; 3]) -> [Vec3; N_VIEWS] {
     })
 }
 
-/// Who looks, and what is in the way.
+/// Views of the model, and the triangles that may hide a point.
 struct Eye<'a> {
     bvh: &'a TriangleBvh,
     views: [Vec3; N_VIEWS],
@@ -98,7 +99,7 @@ struct Eye<'a> {
 }
 
 impl Eye<'_> {
-    /// From which views `at`, where the surface faces `outward`, is seen.
+    /// Tells for each view if it sees `at`, where the surface faces `outward`.
     fn sees(&self, at: Vec3, outward: Vec3) -> [bool; N_VIEWS] {
         let above = at + LIFT_MM * outward;
         self.views
@@ -129,13 +130,14 @@ fn samples_of(mesh: &TriMesh, topology: &Topology, eye: &Eye<'_>, seam: HalfEdge
     (0..n).map(sample).collect()
 }
 
-/// Where one ends who walks [`BESIDE_MM`] over the surface from `at` on edge `start`, into its triangle and always
-/// within the plane through `at` across `along`.
+/// End of a walk of [`BESIDE_MM`] over the surface. The walk starts from `at` on edge `start` into its
+/// triangle. It stays within the plane through `at` across `along`.
 fn walk(mesh: &TriMesh, topology: &Topology, start: HalfEdge, at: Vec3, along: Vec3) -> Vec3 {
     let height = |v: u32| (mesh.points[v as usize] - at).dot(along);
     let (mut edge, mut here, mut left_mm) = (start, at, BESIDE_MM);
     for _ in 0..MOST_CROSSED {
-        // The third corner lies on one side of the plane, so it leaves through one of the other two edges.
+        // The third corner lies on one side of the plane, so the section leaves through one of the other two
+        // edges.
         let mut next = Topology::next(edge);
         let is_crossed = |(u, v): (u32, u32)| (height(u) >= 0.0) != (height(v) >= 0.0);
         if !is_crossed(ends(mesh, next)) {
@@ -155,9 +157,9 @@ fn walk(mesh: &TriMesh, topology: &Topology, start: HalfEdge, at: Vec3, along: V
     here
 }
 
-/// By how much the section through `at` across `along` bends, (−2π, 2π]: the angles by which its `ends`, on the
-/// left of `along` and on the right, rise above the plane that faces `outward`. Which plane that is hardly matters:
-/// tilted, one angle gains what the other loses.
+/// Bend of the section through `at` across `along`, rad, in (−2π, 2π]. It sums the angles by which the two
+/// `ends`, left and right of `along`, rise above the plane that faces `outward`. The choice of that plane
+/// matters little: if it is tilted, one angle gains what the other loses.
 fn bend_rad(at: Vec3, along: Vec3, outward: Vec3, ends: [Vec3; 2]) -> f64 {
     let up = (outward - outward.dot(along) * along).normalize_or_zero();
     let to_left = up.cross(along);
@@ -165,7 +167,7 @@ fn bend_rad(at: Vec3, along: Vec3, outward: Vec3, ends: [Vec3; 2]) -> f64 {
     rise(ends[0], to_left) + rise(ends[1], -to_left)
 }
 
-/// Points with more than two seam edges.
+/// Number of points with more than two seam edges.
 fn n_triple_points(mesh: &TriMesh, seam: &[HalfEdge]) -> usize {
     let mut touched: Vec<u32> = seam
         .iter()

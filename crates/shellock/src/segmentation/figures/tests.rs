@@ -13,7 +13,7 @@ fn ball() -> TriMesh {
     sphere(5, Vec3::splat(RADIUS_MM))
 }
 
-/// A cube of 40 mm, its edges short.
+/// A cube of 40 mm with short edges.
 fn cube() -> TriMesh {
     let cube = cuboid([0.0; 3], [40.0; 3]).to_mesh();
     let params = SegmentationParams::default();
@@ -22,10 +22,11 @@ fn cube() -> TriMesh {
         .into_mesh()
 }
 
-/// Two balls of 30 mm, their middles 48 mm apart, that meet in a circle of 18 mm: a band of each around z.
+/// Two overlapping balls of 30 mm, their centres 48 mm apart on the z axis, which meet in a circle of radius
+/// 18 mm.
 fn two_balls() -> TriMesh {
     let mut mesh = sphere(6, Vec3::splat(RADIUS_MM));
-    // The equator goes to the neck, each half to the ball beyond its plane.
+    // The equator moves to the neck, and each half to the ball beyond the neck's plane.
     let neck_z = 24.0;
     for p in &mut mesh.points {
         let d = *p / RADIUS_MM;
@@ -67,7 +68,7 @@ fn a_ball_cut_at_its_equator_has_a_seam_of_two_pi_r_half_of_it_in_sight_and_none
     assert_near(found.area_mm2.least / (TAU * RADIUS_MM * RADIUS_MM), 1.0, 0.01);
 }
 
-/// Of a half ball 95 % lies within acos 0.05 of its pole.
+/// 95 % of a half ball's area lies within acos 0.05 of its pole.
 #[test]
 fn a_half_ball_faces_one_way_and_a_whole_one_does_not() {
     let tilt = Vec3::new(1.0, 2.0, 3.0).normalize();
@@ -92,7 +93,7 @@ fn a_seam_at_the_neck_of_two_balls_lies_in_a_crease_and_not_on_the_front() {
     let seams = figures_of(&surface).seams;
     assert_near(seams.length_mm, TAU * 18.0, 1.0);
     assert_eq!((seams.concave_share, seams.front_share), (1.0, 0.0));
-    // One looks level into the crease from the front half of it.
+    // The crease is visible from views level with it, half of it from each.
     assert_near(seams.visible_share, 0.5, 0.02);
 }
 
@@ -103,11 +104,11 @@ fn a_cube_has_seams_over_edges_and_on_planes() {
     assert_near(top.seams.length_mm, 160.0, 1e-9);
     assert!(top.pieces[1].is_disk && top.pieces[1].faces.half_angle_deg < 1e-5);
     assert_near(top.area_mm2.least, 1600.0, 1e-9);
-    // A seam on the underside is seen by nobody who looks level.
+    // A seam on the underside is not visible in level views.
     let under = label(cube(), 2, |p| u32::from(p.z < 0.1 && p.x > 20.0));
     let seams = figures_of(&under).seams;
     assert_near(seams.flat_share, 40.0 / 120.0, 0.03);
-    // Three edges, each from three of eight views.
+    // Three edges, each visible in three of eight views.
     assert_near(seams.visible_share, 3.0 / 8.0 * 80.0 / 120.0, 0.02);
 }
 
@@ -122,13 +123,13 @@ fn the_front_is_towards_minus_y_where_z_is_up_and_towards_z_where_y_is_up() {
     assert!((front.length() - 1.0).abs() < 1e-12 && front.dot(up).abs() < 1e-12);
 }
 
-/// The upright circle x = 0 of a ball: its half towards y is not seen from −y, where z is up, and from no side is
-/// more than a half of it.
+/// Two upright half circles on a ball, at azimuths 0° and 90°, are not visible from the front at −y. Mirrored
+/// in y, one of them faces the front.
 #[test]
 fn a_seam_on_the_back_is_not_on_the_front() {
     let quarter = |p: Vec3| u32::from(p.x > 0.0 && p.y > 0.0);
     let surface = label(ball(), 2, quarter);
-    // Half circles at azimuths 0° and 90°: the front at −90° sees neither but at its rim.
+    // Half circles at azimuths 0° and 90°: the front at −90° sees neither except at its rim.
     let from_behind = figures_of(&surface).seams;
     assert!(from_behind.front_share < 0.02, "{from_behind:?}");
     let mirrored = label(ball(), 2, |p| quarter(Vec3::new(p.x, -p.y, p.z)));
@@ -141,7 +142,7 @@ fn a_ring_is_no_disk_and_its_inner_seam_is_seen_by_nobody_who_looks_level() {
     let found = figures_of(&label(torus.clone(), 2, |p| u32::from(p.z > 0.0)));
     assert!(found.pieces.iter().all(|p| !p.is_disk));
     assert_eq!(found.seams.concave_share, 0.0);
-    // Half of the outer circle of 52 mm, nothing of the inner one of 28.
+    // Half of the outer circle of 52 mm is visible, and nothing of the inner one of 28 mm.
     assert_near(found.seams.visible_share, 0.5 * 52.0 / 80.0, 0.02);
     let quarters = label(torus, 4, |p| u32::from(p.x > 0.0) + 2 * u32::from(p.z > 0.0));
     let found = figures_of(&quarters);
@@ -153,7 +154,7 @@ fn a_ring_is_no_disk_and_its_inner_seam_is_seen_by_nobody_who_looks_level() {
     );
 }
 
-/// Three slices of a ball: the one in the middle alone holds the others.
+/// Three slices of a ball: the middle one is the only link between the others.
 #[test]
 fn who_alone_holds_others_is_named() {
     let surface = label(ball(), 3, |p| u32::from(p.z > -10.0) + u32::from(p.z > 10.0));
