@@ -32,7 +32,7 @@ const NOT_RUN: [(&str, &str); 6] = [
 
 /// Guides whose kits are made; of the others commands are only understood, unless SHELLOCK_GUIDES is `all`: with
 /// `--help` behind them they end at once, or at an option that there is not.
-const IN_FULL: [&str; 3] = ["README.md", "batch.md", "getting-started.md"];
+const IN_FULL: [&str; 4] = ["README.md", "batch.md", "getting-started.md", "reference.md"];
 
 /// What is added to a command that does not say otherwise: few pieces, soon.
 const SOON: [(&str, &str); 4] = [
