@@ -32,6 +32,7 @@ pub struct Ctx<'a> {
     stop: &'a AtomicBool,
     is_time_up: Option<&'a (dyn Fn() -> bool + Sync)>,
     seconds_left: Option<&'a (dyn Fn() -> f64 + Sync)>,
+    ends_in_time: bool,
     warnings: Mutex<Vec<Warning>>,
 }
 
@@ -43,6 +44,7 @@ impl<'a> Ctx<'a> {
             stop,
             is_time_up: None,
             seconds_left: None,
+            ends_in_time: false,
             warnings: Mutex::new(Vec::new()),
         }
     }
@@ -75,6 +77,15 @@ impl<'a> Ctx<'a> {
         }
     }
 
+    /// Makes the end of the time a stop: work that is not done by then is given up. The caller tells it from a stop of the
+    /// user by [`Ctx::check`] of the context that it came from.
+    pub fn ending_in_time(self) -> Self {
+        Self {
+            ends_in_time: true,
+            ..self
+        }
+    }
+
     /// Seconds left for the whole job; infinite without a clock.
     pub fn seconds_left(&self) -> f64 {
         self.seconds_left.map_or(f64::INFINITY, |left| left())
@@ -102,9 +113,9 @@ impl<'a> Ctx<'a> {
         (self.report)(Progress::Note(text));
     }
 
-    /// Fails if the user requested a stop; long loops call it regularly.
+    /// Fails if the user requested a stop, or at the end of the time where that is a stop. Long loops call it regularly.
     pub fn check(&self) -> Result<(), Cancelled> {
-        if self.stop.load(Ordering::Relaxed) {
+        if self.stop.load(Ordering::Relaxed) || (self.ends_in_time && self.seconds_left() <= 0.0) {
             Err(Cancelled)
         } else {
             Ok(())
@@ -126,6 +137,7 @@ impl<'a> Ctx<'a> {
             stop: self.stop,
             is_time_up: self.is_time_up,
             seconds_left: self.seconds_left,
+            ends_in_time: self.ends_in_time,
             warnings: Mutex::new(Vec::new()),
         }
     }
@@ -139,5 +151,30 @@ impl<'a> Ctx<'a> {
             }
         }
         seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_the_time_stops_only_work_that_ends_in_time() {
+        for (left_s, is_over) in [(1.0, false), (0.0, true), (-1.0, true)] {
+            let left = || left_s;
+            let job = Ctx::quiet().with_deadline(&left);
+            let part = job.fork().ending_in_time();
+            assert!(job.check().is_ok());
+            assert_eq!(part.check().is_err(), is_over);
+            assert_eq!(
+                part.fork().check().is_err(),
+                is_over,
+                "parts of a part end with it"
+            );
+        }
+        assert!(
+            Ctx::quiet().ending_in_time().check().is_ok(),
+            "without a clock nothing ends"
+        );
     }
 }

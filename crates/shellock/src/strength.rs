@@ -324,17 +324,17 @@ impl Strength {
 }
 
 /// Largest stress of all falls, by place.
-pub struct StressMap<'a> {
+pub struct StressMap {
     bvh: TriangleBvh,
-    largest_mpa: &'a [f64],
+    largest_mpa: Vec<f64>,
 }
 
-impl<'a> StressMap<'a> {
+impl StressMap {
     /// Indexes the analysis mesh's triangles.
-    pub fn new(strength: &'a Strength) -> Self {
+    pub fn new(strength: &Strength) -> Self {
         Self {
             bvh: TriangleBvh::new(&strength.mesh),
-            largest_mpa: &strength.largest_mpa,
+            largest_mpa: strength.largest_mpa.clone(),
         }
     }
 

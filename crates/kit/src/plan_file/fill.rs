@@ -94,7 +94,7 @@ impl PlanFile {
             joints: joints(design),
             contacts: contacts(design),
             gaps: Some(GapsEntry::of(design)),
-            effort: Some(design.effort),
+            effort: Some(design.effort.clone()),
             verification: Some(VerdictEntry {
                 passed: kit.verification.passed(),
                 checks: kit.verification.checks.clone(),

@@ -1,31 +1,53 @@
-//! Plans and kits of one division, until one passes or nothing new can be tried.
+//! One attempt: the plan of a trial, and the kit that is made of it.
 
-use super::budget::{BLOCKED_PLANS, Budget, Levers, Pace};
-use super::division::{Division, WallGrid, joined};
+use shellock_geom::Vec3;
+
+use super::agenda::{Allowance, Step};
+use super::division::{Division, join, revise};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
-use super::strengthen::{Remedy, remedy};
-use super::{DesignError, Job, Kit, Params};
-use crate::body::{BodyError, GridError, PatchDistances};
+use super::strengthen::strengthen;
+use super::trial::{Change, Learned, Parts, Setup};
+use super::ways::Input;
+use super::{DesignError, Kit, Planned};
+use crate::body::BodyError;
 use crate::handling::Handling;
 use crate::key::Turn;
 use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
 use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
-use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
-use shellock_geom::{Solid, Vec3};
+use crate::{Ctx, PatchId, key, metric, plan};
 
-/// How one division went.
-pub(super) enum Attempt {
-    Passed,
-    /// Nothing was made, since pieces are foreseen to rattle; with these pieces less.
-    Joined(SegmentedSurface),
-    /// Nothing was made, since it would bear too little; what helps.
-    Weak(Box<Remedy>),
-    Failed(Failure),
+/// Result of an attempt.
+pub(super) struct Found<T> {
+    /// A kit or a plan.
+    pub end: Option<T>,
+    /// Reason for another attempt.
+    pub failure: Failure,
+    /// Changes that may help, most promising first.
+    pub changes: Vec<Change>,
+    /// Change that a lack of time rules out.
+    pub late: Option<Step>,
 }
 
-/// Why a division did not do.
-#[derive(Default)]
+impl<T> Found<T> {
+    /// Result of a trial that nothing can be made of.
+    pub fn nothing(failure: Failure) -> Self {
+        Self {
+            end: None,
+            failure,
+            changes: Vec::new(),
+            late: None,
+        }
+    }
+
+    fn with(mut self, change: Option<Change>) -> Self {
+        self.changes.extend(change);
+        self
+    }
+}
+
+/// Reason why a trial failed.
+#[derive(Clone, Default)]
 pub(super) struct Failure {
     pub reason: String,
     pub blockers: Vec<Blocker>,
@@ -33,122 +55,103 @@ pub(super) struct Failure {
     pub blamed: Vec<PatchId>,
     /// Pieces that came out loose in the last kit.
     pub loose: Vec<PatchId>,
-    /// Pieces that rattle in the last kit, where nothing else is wrong with it; the loosest first, and
-    /// without the key.
-    pub rattling: Vec<PatchId>,
 }
 
-/// Keeps a kit where it is the best so far: that with the fewest failures, then that rattles least, the
-/// earliest of several.
-pub(super) fn keep(best: &mut Option<Kit>, kit: Kit) {
-    if best.as_ref().is_none_or(|b| kit.is_better_than(b)) {
-        *best = Some(kit);
+impl Failure {
+    pub fn of(reason: &str) -> Self {
+        Self {
+            reason: reason.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Two pieces never lock: if the key leaves one way, nothing keeps the other piece from leaving the opposite way.
+    fn of_two() -> Self {
+        Self {
+            blamed: vec![PatchId(0), PatchId(1)],
+            ..Self::of("two pieces come apart whichever of them is pulled; three can lock")
+        }
+    }
+
+    /// The failure of a later plan, whose blame comes first, with the blame of this one.
+    fn after(&self, later: Self) -> Self {
+        Self {
+            blamed: later.blamed.iter().chain(&self.blamed).copied().collect(),
+            loose: self.loose.clone(),
+            ..later
+        }
     }
 }
 
-/// Plans and makes kits of one division. The best kit goes to `best`, what it cost off the `budget`.
-pub(super) fn plans(
+/// Makes the kit of the best plan of a trial.
+pub(super) fn make_kit(
     ctx: &Ctx,
-    job: &Job<'_>,
-    turn: &Turn,
-    wall: &mut WallGrid<'_>,
-    division: &Division,
-    budget: &mut Budget,
-    best: &mut Option<Kit>,
-) -> Result<Attempt, DesignError> {
-    let params = job.params;
-    let Division {
-        surface,
-        settings,
+    Parts {
+        job, setup, effort, ..
+    }: Parts<'_, '_>,
+    allowance: &Allowance,
+) -> Result<Found<Kit>, DesignError> {
+    // A kit that is given up takes its warnings with it.
+    let kit_ctx = ctx.fork();
+    setup.division.warn(&kit_ctx);
+    setup.survey_plans(ctx)?;
+    effort.plans += 1;
+    let Setup {
+        candidate,
+        division,
+        grid,
+        survey,
+        learned,
+    } = setup;
+    let planning = Planning {
+        input: job.input,
+        turn: &candidate.turn,
+        division,
+        survey: survey.as_ref().expect("plans were surveyed"),
+        constraints: &learned.constraints,
+    };
+    let (params, model, surface) = (&division.settings.body, &*candidate.model, &division.surface);
+    // The proof of a plan runs on one thread; the grid and the distances in it are made beside it.
+    let (measured, next) = rayon::join(
+        || grid.measure(params, model, surface),
+        || next_plan(&kit_ctx, &planning, allowance),
+    );
+    let (grid, distances) = measured?;
+    let (chosen, late) = match next? {
+        Next::Plan(chosen, late) => (*chosen, late),
+        Next::Changes(changes, late) => {
+            return Ok(Found {
+                changes,
+                late,
+                ..Found::nothing(Failure::default())
+            });
+        }
+        Next::None(failure) => {
+            let failure = learned.failure.after(failure);
+            let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
+            return Ok(Found::nothing(failure).with(change));
+        }
+    };
+    let recipe = Recipe {
+        params: job.input.params,
+        division,
+        model: job.input.model,
+        turn: &candidate.turn,
+        grid,
+        distances,
         chosen,
-        ..
-    } = division;
-    let survey = plan::survey(
-        &ctx.fork(),
-        &settings.plan,
-        surface,
-        &surface.seams(),
-        &chosen.sizes,
-    )?;
-    let mut distances: Option<PatchDistances> = None;
-    let mut learned = Learned::default();
-    let most_kits = budget.kits_each.min(budget.kits);
-    while learned.n_kits < most_kits && learned.n_blocked < BLOCKED_PLANS {
-        let is_first = learned.n_kits + learned.n_blocked == 0;
-        if !is_first && job.pace.is_late(ctx) {
-            job.pace.skip(ctx, "another plan");
-            break;
+    };
+    let found = match unless_blocked(make(kit_ctx, recipe))? {
+        Ok(kit) => {
+            effort.kits += 1;
+            learn(ctx, division, learned, kit, allowance)?
         }
-        let left_s = ctx.seconds_left();
-        // A kit that is given up takes its warnings with it.
-        let kit_ctx = ctx.fork();
-        division.tell(&kit_ctx);
-        // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
-        let may_join = budget.foreseen_joinings > 0;
-        let levers = learned.levers(budget);
-        budget.spent.plans += 1;
-        let (measured, next) = rayon::join(
-            || {
-                let grid = wall.get()?;
-                distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
-                Ok::<(), GridError>(())
-            },
-            || {
-                let planning = Planning {
-                    params,
-                    model: job.model,
-                    turn,
-                    division,
-                    survey: &survey,
-                    constraints: &learned.constraints,
-                    begun_s: job.begun_s,
-                    pace: &job.pace,
-                };
-                next_plan(&kit_ctx, &planning, may_join, &levers)
-            },
-        );
-        measured?;
-        let chosen = match next? {
-            Next::Plan(chosen) => *chosen,
-            Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
-            Next::Weak(remedy) => return Ok(Attempt::Weak(remedy)),
-            Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
-        };
-        let grid = wall.get()?;
-        let distances = distances.as_ref().expect("they were measured beside the plan");
-        let recipe = Recipe {
-            params,
-            division,
-            model: job.model,
-            turn,
-            grid,
-            distances,
-            chosen,
-        };
-        let kit = match unless_blocked(make(kit_ctx, recipe))? {
-            Ok(kit) => kit,
-            Err(lesson) => {
-                learned.give_up(ctx, lesson);
-                continue;
-            }
-        };
-        job.pace.made(ctx, left_s);
-        budget.kits -= 1;
-        budget.spent.kits += 1;
-        let ending = learned.learn(ctx, &kit, budget.kits_each);
-        keep(best, kit);
-        if let Some(ending) = ending {
-            return Ok(ending);
-        }
-    }
-    let reason = "no kit passed its verification within the allowed rounds".into();
-    Ok(Attempt::Failed(Failure {
-        reason,
-        ..learned.failure
-    }))
+        Err(lesson) => give_up(ctx, division, learned, &lesson, allowance)?,
+    };
+    Ok(Found { late, ..found })
 }
 
-/// The kit, or the lesson of a piece that something stands in the way of.
+/// Returns the kit, or the lesson of a piece that something blocks.
 fn unless_blocked(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>, DesignError> {
     match made {
         Err(DesignError::Body(BodyError::Blocked {
@@ -164,95 +167,103 @@ fn unless_blocked(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>,
     }
 }
 
-/// What the plans and kits of a division taught so far.
-#[derive(Default)]
-struct Learned {
-    constraints: PlanConstraints,
-    failure: Failure,
-    n_kits: usize,
-    n_blocked: usize,
+/// Gives a plan up, since a piece could not take its wall along.
+fn give_up(
+    ctx: &Ctx,
+    division: &Division,
+    learned: &mut Learned,
+    lesson: &Lesson,
+    allowance: &Allowance,
+) -> Result<Found<Kit>, DesignError> {
+    learned.add(lesson);
+    another_plan(
+        ctx,
+        division,
+        learned,
+        (Step::Replan, std::slice::from_ref(lesson)),
+        allowance,
+    )
 }
 
-impl Learned {
-    /// What may be changed so that a kit bears more: nothing where kits taught something of these pieces, which
-    /// would be lost.
-    fn levers(&self, budget: &Budget) -> Levers {
-        if self.n_kits == 0 {
-            budget.levers
-        } else {
-            Levers::default()
-        }
-    }
-
-    /// A plan was given up since a piece could not take its wall along.
-    fn give_up(&mut self, ctx: &Ctx, lesson: Lesson) {
-        ctx.note(&format!("{lesson}: trying another plan"));
-        self.failure.blamed.extend(lesson.blamed());
-        lesson.teach(&mut self.constraints);
-        self.n_blocked += 1;
-    }
-
-    /// A kit was made; how the attempt ends where no other plan can help.
-    fn learn(&mut self, ctx: &Ctx, kit: &Kit, most_kits: usize) -> Option<Attempt> {
-        self.n_kits += 1;
-        if kit.is_firm() {
-            return Some(Attempt::Passed);
-        }
-        if kit.only_rattles() {
-            // The plan was chosen to rattle least: other pieces are what helps.
-            let patch = |piece: PatchId| kit.handover.patch(piece);
-            let rattling = kit.rattling().into_iter().map(patch).collect();
-            let reason = "pieces rattle".into();
-            return Some(Attempt::Failed(Failure {
-                reason,
-                rattling,
-                ..Failure::default()
-            }));
-        }
-        let lessons = lessons(kit);
-        self.failure
-            .blamed
-            .extend(lessons.iter().flat_map(Lesson::blamed));
-        self.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
+/// Learns from a kit what may help.
+fn learn(
+    ctx: &Ctx,
+    division: &Division,
+    learned: &mut Learned,
+    kit: Kit,
+    allowance: &Allowance,
+) -> Result<Found<Kit>, DesignError> {
+    learned.n_kits += 1;
+    let found = if kit.is_firm() {
+        Found::nothing(Failure::default())
+    } else if kit.only_rattles() {
+        // The plan was chosen to rattle least, so only other pieces help.
+        let rattling: Vec<PatchId> = kit
+            .rattling()
+            .into_iter()
+            .map(|piece| kit.handover.patch(piece))
+            .collect();
+        let change = match allowance.is_wanted(Step::JoinRattling) {
+            true => join(ctx, &division.settings.segmentation, &division.surface, &rattling)?,
+            false => None,
+        };
+        let change = change.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
+        Found::nothing(Failure::of("pieces rattle")).with(change)
+    } else {
+        let lessons = lessons(&kit);
+        learned.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
         for lesson in &lessons {
-            if self.n_kits < most_kits {
-                ctx.note(&format!("{lesson}: trying another plan"));
-            }
-            lesson.teach(&mut self.constraints);
+            learned.add(lesson);
         }
-        None
-    }
+        another_plan(ctx, division, learned, (Step::Remake, &lessons), allowance)?
+    };
+    Ok(Found {
+        end: Some(kit),
+        ..found
+    })
 }
 
-impl Failure {
-    /// True where nothing but pieces that rattle is wrong with the last kit.
-    pub fn rattles(&self) -> bool {
-        !self.rattling.is_empty()
-    }
-
-    /// Where the key leaves one way, the other piece leaves the opposite way: it is held by nothing.
-    fn of_two() -> Self {
-        Self {
-            reason: "two pieces come apart whichever of them is pulled; three can lock".into(),
-            blamed: vec![PatchId(0), PatchId(1)],
-            ..Self::default()
+/// Offers another plan, which respects the lessons, or other pieces if no more plans are allowed.
+fn another_plan(
+    ctx: &Ctx,
+    division: &Division,
+    learned: &Learned,
+    (step, lessons): (Step, &[Lesson]),
+    allowance: &Allowance,
+) -> Result<Found<Kit>, DesignError> {
+    let mut failure = learned.failure.clone();
+    failure.reason = "no kit passed its verification within the allowed rounds".to_owned();
+    if allowance.is_allowed(step) {
+        for lesson in lessons {
+            ctx.note(&format!("{lesson}: trying another plan"));
         }
+        return Ok(Found::nothing(failure).with(Some(Change::Step(step))));
     }
-
-    /// The failure of a later plan, which is to blame first, with what was blamed before.
-    fn after(self, later: Self) -> Self {
-        let blamed = later.blamed.into_iter().chain(self.blamed).collect();
-        Self {
-            blamed,
-            loose: self.loose,
-            ..later
-        }
-    }
+    let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
+    let late = allowance.late(step);
+    Ok(Found {
+        late,
+        ..Found::nothing(failure).with(change)
+    })
 }
 
-/// The pieces that are foreseen to rattle far more than they may, the loosest first.
-fn foreseen_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
-    /// Play is foreseen within about this factor.
+/// Offers other pieces, if that is allowed.
+fn divide(
+    ctx: &Ctx,
+    division: &Division,
+    (failure, n_kits): (&Failure, usize),
+    allowance: &Allowance,
+) -> Result<Option<Change>, DesignError> {
+    if !allowance.is_wanted(Step::Divide) {
+        return Ok(None);
+    }
+    let surface = revise(ctx, division, failure, allowance.is_hopeless && n_kits == 0)?;
+    Ok(surface.map(|surface| Change::Divide(Step::Divide, surface, None)))
+}
+
+/// Returns the pieces that are predicted to rattle far more than they may, the loosest first.
+fn predicted_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
+    /// Play is predicted within about this factor.
     const SURELY: f64 = 1.2;
     let excess = excess
         .iter()
@@ -265,47 +276,37 @@ fn foreseen_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
     wide.into_iter().map(|w| w.0).collect()
 }
 
-/// What is to be made of a division.
+/// Next thing to do with a division.
 pub(super) enum Next {
-    /// The plan that holds best of those that cost about the least.
-    Plan(Box<Chosen>),
-    /// Nothing yet: pieces are foreseen to rattle; with these pieces less.
-    Joined(SegmentedSurface),
-    /// Nothing yet: it would bear too little; what helps.
-    Weak(Box<Remedy>),
-    /// Nothing, and why.
+    /// Make the kit of this plan, which holds best of those that cost about the least. A lack of time may have ruled out
+    /// a step that would make it stronger.
+    Plan(Box<Chosen>, Option<Step>),
+    /// Make nothing yet: change the trial first.
+    Changes(Vec<Change>, Option<Step>),
+    /// There is no plan, for this reason.
     None(Failure),
 }
 
-/// What a plan is sought for.
+/// Input of the search for a plan.
 pub(super) struct Planning<'a> {
-    pub params: &'a Params,
-    /// As it was given, and how it was turned for the division.
-    pub model: &'a Solid,
+    pub input: Input<'a>,
+    /// Turn of the model for the division.
     pub turn: &'a Turn,
     pub division: &'a Division,
     pub survey: &'a PlanSurvey,
     pub constraints: &'a PlanConstraints,
-    /// What was left of the time when the job with this wall began, s.
-    pub begun_s: f64,
-    /// Record of what is left out for want of time.
-    pub pace: &'a Pace,
 }
 
 impl Planning<'_> {
-    /// Whether the job may begin anew: as much time is left as it has taken.
-    pub fn may_begin_anew(&self, ctx: &Ctx) -> bool {
-        2.0 * ctx.seconds_left() >= self.begun_s
-    }
-
-    /// How the kit is handled, in the space of the division.
+    /// Loads on the kit, in the space of the division.
     pub fn handling(&self) -> Handling {
-        let up = self.turn.apply(Vec3::from_array(self.params.up)).to_array();
+        let params = self.input.params;
+        let up = self.turn.apply(Vec3::from_array(params.up)).to_array();
         let thickness_mm = self.division.settings.body.thickness_mm;
-        Handling::new(up, thickness_mm, self.params.material)
+        Handling::new(up, thickness_mm, params.material)
     }
 
-    /// What plans are compared by.
+    /// Criteria by which plans are compared.
     pub fn choice<'b>(&'b self, handling: &'b Handling) -> Choice<'b> {
         Choice {
             params: &self.division.settings.plan,
@@ -319,41 +320,77 @@ impl Planning<'_> {
     }
 }
 
-/// The next plan of a division to make.
+/// Seeks the plan that a kit would be made of, without making it.
+pub(super) fn seek_plan(
+    ctx: &Ctx,
+    Parts {
+        job, setup, effort, ..
+    }: Parts<'_, '_>,
+    allowance: &Allowance,
+) -> Result<Found<Planned>, DesignError> {
+    let plan_ctx = ctx.fork();
+    setup.division.warn(&plan_ctx);
+    setup.survey_plans(&plan_ctx)?;
+    effort.plans += 1;
+    let division = &setup.division;
+    let planning = Planning {
+        input: job.input,
+        turn: &setup.candidate.turn,
+        division,
+        survey: setup.survey.as_ref().expect("plans were surveyed"),
+        constraints: &setup.learned.constraints,
+    };
+    Ok(match next_plan(&plan_ctx, &planning, allowance)? {
+        Next::Plan(chosen, late) => {
+            let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
+            Found {
+                end: Some(Planned::new(
+                    &setup.candidate.turn,
+                    &division.surface,
+                    *chosen,
+                    warnings,
+                )),
+                late,
+                ..Found::nothing(Failure::default())
+            }
+        }
+        Next::Changes(changes, late) => Found {
+            changes,
+            late,
+            ..Found::nothing(Failure::default())
+        },
+        Next::None(failure) => {
+            let change = divide(ctx, division, (&failure, 0), allowance)?;
+            Found::nothing(failure).with(change)
+        }
+    })
+}
+
+/// Seeks the next plan of a division to make.
 pub(super) fn next_plan(
     ctx: &Ctx,
     planning: &Planning<'_>,
-    may_join: bool,
-    levers: &Levers,
+    allowance: &Allowance,
 ) -> Result<Next, DesignError> {
-    let &Planning {
-        params,
-        division,
-        survey,
-        constraints,
-        ..
-    } = planning;
+    let division = planning.division;
     let Division {
         surface, settings, ..
     } = division;
     if surface.n_patches == 2 {
         return Ok(Next::None(Failure::of_two()));
     }
-    let found = match plan::search(ctx, &settings.plan, survey, constraints)? {
+    let found = match plan::search(ctx, &settings.plan, planning.survey, planning.constraints)? {
         PlanOutcome::Found(found) => found,
         PlanOutcome::Infeasible {
             reason,
             blockers,
             articulations,
         } => {
-            let blamed = articulations
-                .into_iter()
-                .chain(blockers.iter().map(|b| b.piece))
-                .collect();
+            let blocked = blockers.iter().map(|b| b.piece);
             return Ok(Next::None(Failure {
+                blamed: articulations.into_iter().chain(blocked).collect(),
                 reason,
                 blockers,
-                blamed,
                 ..Failure::default()
             }));
         }
@@ -362,95 +399,36 @@ pub(super) fn next_plan(
     let choice = planning.choice(&handling);
     ctx.stage("what would rattle", 0)?;
     let foresight = Foresight::of(&choice, &found);
-    if may_join && let Some((plan, excess)) = foresight.steadiest() {
-        let rattling = foreseen_to_rattle(plan.plan.key(), excess);
-        if let Some(fewer) = joined(ctx, &settings.segmentation, surface, &rattling)? {
-            return Ok(Next::Joined(fewer));
+    if allowance.is_allowed(Step::JoinPredicted)
+        && let Some((plan, excess)) = foresight.steadiest()
+    {
+        let rattling = predicted_to_rattle(plan.plan.key(), excess);
+        if let Some(fewer) = join(ctx, &settings.segmentation, surface, &rattling)? {
+            let change = Change::Divide(Step::JoinPredicted, fewer, None);
+            return Ok(Next::Changes(vec![change], None));
         }
     }
     let best = metric::choose(ctx, &choice, &foresight, *found)?;
     if settings.plan.key_slide.is_none() {
-        warn_of_key(ctx, params, division, &best.found.plan);
+        warn_of_key(ctx, planning, &best.found.plan);
     }
     let plan = (&best.found.pool[0], &best.holding);
-    Ok(match remedy(ctx, planning, &handling, plan, levers)? {
-        Some(remedy) => Next::Weak(Box::new(remedy)),
-        None => Next::Plan(Box::new(best)),
+    let (changes, late) = strengthen(ctx, planning, &handling, plan, allowance)?;
+    Ok(match changes.is_empty() {
+        true => Next::Plan(Box::new(best), late),
+        false => Next::Changes(changes, late),
     })
 }
 
-/// Says which conditions a key breaks that was not cut to meet them.
-fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &LatticePlan) {
-    let may_be_cut = !params.key.is_cut();
+/// Warns of conditions that a key breaks which was not cut to meet them.
+fn warn_of_key(ctx: &Ctx, planning: &Planning<'_>, plan: &LatticePlan) {
+    let division = planning.division;
+    let may_be_cut = !planning.input.params.key.is_cut();
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {
         let largest_mm = division.chosen.sizes.largest_mm();
-        found
-            .problems(last.piece, largest_mm, may_be_cut)
-            .into_iter()
-            .for_each(|problem| ctx.warn(problem));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::division::revised;
-    use super::super::wall::Wall;
-    use super::super::ways::{Ask, Input};
-    use super::super::{Candidate, Settings};
-    use super::*;
-    use crate::testing;
-
-    #[test]
-    fn no_kit_is_made_of_two_pieces_and_one_of_them_is_divided() {
-        let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
-        let params = Params::default();
-        let halves = testing::voronoi(model.mesh().clone(), 2, 1);
-        assert_eq!(halves.n_patches, 2);
-        let wall = Wall {
-            settings: Settings::resolve(&params),
-            strength: None,
-            warnings: Vec::new(),
-        };
-        let input = Input {
-            params: &params,
-            model: &model,
-            labels: None,
-        };
-        let ask = Ask {
-            factor: 1.0,
-            rounds: params.rounds,
-            n_thicker: 0,
-        };
-        let ctx = Ctx::quiet();
-        let job = Job::of(&input, &wall, ask, false, halves).expect("no key is named");
-        let candidate = Candidate::new(&job, 0, None).expect("as it lies");
-        let division = candidate.division(&ctx, &job, candidate.surface.clone());
-        let division = division.expect("sizes").expect("no key is cut");
-        let survey = plan::survey(
-            &ctx,
-            &division.settings.plan,
-            &division.surface,
-            &division.surface.seams(),
-            &division.chosen.sizes,
-        );
-        let planning = Planning {
-            params: &params,
-            model: &model,
-            turn: &candidate.turn,
-            division: &division,
-            survey: &survey.expect("not stopped"),
-            constraints: &PlanConstraints::default(),
-            begun_s: 0.0,
-            pace: &job.pace,
-        };
-        let next = next_plan(&ctx, &planning, false, &Levers::default()).expect("not stopped");
-        let Next::None(failure) = next else {
-            panic!("two pieces never lock")
-        };
-        let mut budget = candidate.budget;
-        let next = revised(&ctx, &division, &failure, false, &mut budget);
-        let revised = next.expect("not stopped").expect("a half can be divided");
-        assert!(revised.n_patches > 2, "{}", revised.n_patches);
+        for problem in found.problems(last.piece, largest_mm, may_be_cut) {
+            ctx.warn(problem);
+        }
     }
 }

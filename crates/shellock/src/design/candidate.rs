@@ -1,13 +1,12 @@
-//! Where the key can come from: cut out of the surface at one of the best places, or one of the pieces as it
-//! is.
+//! Candidates for the key: cut out of the surface at one of the best places, or one of the pieces as it is.
 
 use std::borrow::Cow;
 
 use shellock_geom::Solid;
 
-use super::budget::{Budget, KITS_OF_CUT_KEYS, Levers};
 use super::division::Division;
-use super::{DesignError, Job, KeySource, Settings};
+use super::trial::Job;
+use super::{DesignError, KeySource, Settings};
 use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
 use crate::piece::Grip;
 use crate::segmentation::{self, SegmentationError};
@@ -15,81 +14,59 @@ use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, sizes};
 
 /// A key that is cut.
 pub(super) struct CutKey {
-    /// Where, in the model as it was given.
-    pub given: KeySite,
-    /// The same in the turned model.
+    /// Site in the turned model.
     site: KeySite,
+    /// Direction in which it slides.
     along: LatticeDirection,
 }
 
-/// One way to come by a key, and the model and its division turned for it.
+/// One candidate for the key, with the model and its division turned for it.
 pub(super) struct Candidate<'a> {
     pub turn: Turn,
     pub model: Cow<'a, Solid>,
     pub surface: SegmentedSurface,
     /// `None` where the key is one of the pieces.
-    pub key: Option<CutKey>,
-    pub budget: Budget,
+    key: Option<CutKey>,
 }
 
-/// Where a key can be: places to cut it, best first; at last, one of the pieces.
-pub(super) fn places(ctx: &Ctx, job: &Job<'_>) -> Result<Vec<Option<KeySite>>, DesignError> {
-    let sites = if job.params.key.is_cut() {
-        key::sites(ctx, &key_params(job), &job.surface)?
-    } else {
-        Vec::new()
-    };
-    Ok(in_turn(sites))
-}
-
-/// Those of `sites` that kits are made with, best first; at last, one of the pieces.
-pub(super) fn in_turn(sites: Vec<KeySite>) -> Vec<Option<KeySite>> {
-    let few = sites.into_iter().take(KITS_OF_CUT_KEYS.len());
-    few.map(Some).chain([None]).collect()
+/// Finds sites to cut the key, best first; none if the key is a piece as it is.
+pub(super) fn sites(ctx: &Ctx, job: &Job<'_>) -> Result<Vec<KeySite>, DesignError> {
+    Ok(match job.input.params.key.is_cut() {
+        true => key::sites(ctx, &key_params(job), &job.surface)?,
+        false => Vec::new(),
+    })
 }
 
 impl<'a> Candidate<'a> {
-    /// The `i`-th of the places. The model is turned so that a key that is cut slides along a lattice
-    /// direction; `None` where rounding leaves no solid.
-    pub fn new(job: &Job<'a>, i: usize, place: Option<&KeySite>) -> Option<Self> {
-        let levers = Levers::of(
-            job.params,
-            job.labels.is_some(),
-            job.may_thicken && i == 0,
-            job.ask.factor,
-        );
+    /// Turns the model so that a key cut at `place` slides along a lattice direction; `None` if rounding then leaves no
+    /// solid.
+    pub fn new(job: &Job<'a>, place: Option<&KeySite>) -> Option<Self> {
         let as_it_lies = Self {
             turn: Turn::default(),
-            model: Cow::Borrowed(job.model),
+            model: Cow::Borrowed(job.input.model),
             surface: job.surface.clone(),
             key: None,
-            budget: Budget::of_piece(&job.rounds()).with_levers(levers),
         };
         let Some(site) = place else {
             return Some(as_it_lies);
         };
         let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
         let key = Some(CutKey {
-            given: *site,
             site: turn.site(site, along),
             along,
         });
-        let mut turned = Self {
-            key,
-            budget: Budget::of_cut_key(&job.rounds(), i).with_levers(levers),
-            ..as_it_lies
-        };
+        let mut turned = Self { key, ..as_it_lies };
         if !turn.is_none() {
-            turned.model = Cow::Owned(turn.solid(job.model).ok()?);
+            turned.model = Cow::Owned(turn.solid(job.input.model).ok()?);
             turned.surface.mesh = turn.mesh(&turned.surface.mesh);
             turned.turn = turn;
         }
         Some(turned)
     }
 
-    /// What stages are given for these pieces, of which the key is cut anew; `None` where it does not come
-    /// out as one piece.
-    pub fn division(
+    /// Cuts the key out of these pieces and settles what the stages are given; `None` if the key does not come out as one
+    /// piece.
+    pub fn divide(
         &self,
         ctx: &Ctx,
         job: &Job<'_>,
@@ -105,7 +82,7 @@ impl<'a> Candidate<'a> {
                 settings,
                 chosen,
                 grip: None,
-                told: Vec::new(),
+                changes: Vec::new(),
             }));
         };
         let Some((surface, patch)) = key.imprinted(ctx, &given, &surface)? else {
@@ -115,17 +92,17 @@ impl<'a> Candidate<'a> {
         let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
         // Its rails have as much room as it was cut for.
         chosen.cap(patch, settings.connector.size.usual_mm());
-        let grip = job.params.has_grip.then(|| key.grip(patch));
+        let grip = job.input.params.has_grip.then(|| key.grip(patch));
         Ok(Some(Division {
             surface,
             settings,
             chosen,
             grip,
-            told: Vec::new(),
+            changes: Vec::new(),
         }))
     }
 
-    /// The job's settings with what is kept whole where it is in the turned model.
+    /// Returns the job's settings, with the regions to keep whole in the turned model.
     fn settings(&self, job: &Job<'_>) -> Settings {
         let mut settings = job.settings().clone();
         for region in &mut settings.segmentation.keep_whole {
@@ -134,7 +111,7 @@ impl<'a> Candidate<'a> {
         settings
     }
 
-    /// Connector sizes, by the stress in the model as it was given.
+    /// Chooses connector sizes by the stress in the model as it was given.
     fn sizes(
         &self,
         ctx: &Ctx,
@@ -143,18 +120,15 @@ impl<'a> Candidate<'a> {
         surface: &SegmentedSurface,
     ) -> Result<sizes::ChosenSizes, DesignError> {
         let back = self.turn.inverse();
-        let stress_at = job
-            .stress
-            .as_ref()
-            .map(|map| move |place| map.at(back.apply(place)));
+        let stress_at = job.stress().map(|map| move |place| map.at(back.apply(place)));
         let stress_mpa = stress_at.as_ref().map(|at| at as sizes::StressField);
         Ok(sizes::choose(&ctx.fork(), &settings.sizes, surface, stress_mpa)?)
     }
 }
 
 impl CutKey {
-    /// The surface with the key as a patch, and its id. Where the key leaves a piece hanging on another, the
-    /// pieces are refined first.
+    /// Returns the surface with the key as a patch, and the id of that patch. If the key leaves a piece hanging on another,
+    /// the pieces are refined first.
     fn imprinted(
         &self,
         ctx: &Ctx,
@@ -179,7 +153,7 @@ impl CutKey {
         Ok(Some(best))
     }
 
-    /// A notch across the key, nearer to its front.
+    /// Returns a notch across the key, nearer to its front.
     fn grip(&self, key: PatchId) -> Grip {
         /// Of its length.
         const FROM_BACK: f64 = 0.65;
@@ -199,6 +173,7 @@ impl CutKey {
     }
 }
 
+/// Parameters of the search for sites.
 pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
     let settings = job.settings();
     KeyParams {
@@ -208,14 +183,14 @@ pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
         piece_mm2: job.surface.mesh.area() / job.surface.n_patches as f64,
         up: settings.plan.up,
         keep_whole: settings.segmentation.keep_whole.clone(),
-        near: match job.params.key {
+        near: match job.input.params.key {
             KeySource::CutNear(place) => Some(place),
             _ => None,
         },
     }
 }
 
-/// A place in words.
+/// Describes a site for people.
 pub(super) fn words(site: &KeySite) -> String {
     let place = match site.shown {
         below if below < 0.2 => "underneath",

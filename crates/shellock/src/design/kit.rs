@@ -2,6 +2,7 @@
 
 use shellock_geom::{Aabb, Solid, TriMesh};
 
+use super::agenda::Grade;
 use super::division::Division;
 use super::handover::Handover;
 use super::{DesignError, Params, Settings};
@@ -101,11 +102,15 @@ impl Kit {
         pieces.filter(|piece| *piece != self.plan.key()).collect()
     }
 
-    /// Whether it has fewer failures, or as many and rattles less.
-    pub fn is_better_than(&self, other: &Self) -> bool {
-        let rattles = |k: &Self| k.rattles.first().map_or(0.0, |r| r.excess);
-        let (own, others) = (self.failures().len(), other.failures().len());
-        own < others || (own == others && rattles(self) < rattles(other))
+    /// Grade by which kits are compared.
+    pub(super) fn grade(&self) -> Grade {
+        Grade {
+            n_pieces: self.pieces.len(),
+            n_failures: self.failures().len(),
+            rattle: self.rattles.first().map_or(0.0, |r| r.excess),
+            only_rattles: self.only_rattles(),
+            others_rattle: !self.rattling().is_empty(),
+        }
     }
 }
 

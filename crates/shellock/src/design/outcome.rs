@@ -1,11 +1,15 @@
-//! How a job ends.
+//! End of a job: the best kit with all that is known of it, or the reason why there is none.
+
+use std::sync::Arc;
 
 use shellock_geom::TriMesh;
 
+use super::agenda::{Agenda, Effort, Grade};
 use super::attempt::Failure;
-use super::budget::RATTLING_KEYS;
-use super::candidate::{self, Candidate};
-use super::{Effort, Explored, Job, KeySource, Kit, Planned, Settings};
+use super::candidate;
+use super::wall::Wall;
+use super::ways::Input;
+use super::{KeySource, Kit, Planned, Settings};
 use crate::body::{BodyError, GridError};
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
@@ -54,17 +58,17 @@ pub struct PrintedFit {
     pub loosest: Option<(PatchId, Play)>,
 }
 
-/// How the job ended.
+/// End of the job.
 pub enum DesignOutcome {
-    /// There is a kit. Whether it passed is in its verification.
+    /// There is a kit; its verification says whether it passed.
     Made(Box<Design>),
     /// No plan was found for any division that was tried.
     NoPlan {
-        /// Why, for people.
+        /// Reason, for people.
         reason: String,
-        /// Who is in whose way.
+        /// Pieces that are in the way of others.
         blockers: Vec<Blocker>,
-        /// Whether the time was over before all was tried: with more of it one may be found.
+        /// True if the time was over before all was tried: with more of it one may be found.
         is_cut_short: bool,
     },
 }
@@ -75,198 +79,289 @@ pub enum DesignOutcome {
 pub struct NoPlan {
     /// Reason, for people.
     pub reason: String,
-    /// True where the time was over before all keys were tried: with more of it one may be found.
+    /// True if the time was over before all was tried: with more of it one may be found.
     pub is_cut_short: bool,
 }
 
-/// Adds to a plan, or to the reason why there is none, that the time was over.
-pub(super) fn conclude_plan(planned: Result<Planned, String>, is_cut_short: bool) -> Result<Planned, NoPlan> {
-    match planned {
-        Ok(mut planned) => {
-            planned.warnings.extend(is_cut_short.then(|| time_up(0)));
-            Ok(planned)
+/// The best end so far, a kit or a plan, and the reasons why other trials failed.
+pub(super) struct Best<T> {
+    kept: Option<Kept<T>>,
+    /// Reasons why keys that were cut with the present wall fail, for people.
+    reasons: Vec<String>,
+    /// First failure with a piece as the key.
+    failure: Option<Failure>,
+    /// Last error with a piece as the key, or of a model that could not be divided.
+    error: Option<DesignError>,
+    /// Failure of the present key so far.
+    present: Failure,
+    /// Grade of the best end with the present key, and its faults for people.
+    of_key: Option<(Grade, Vec<String>)>,
+}
+
+/// An end with what it was made of.
+struct Kept<T> {
+    end: T,
+    grade: Grade,
+    key: Option<KeySite>,
+    wall: Arc<Wall>,
+    /// Reasons why keys that were cut with its wall fail.
+    reasons: Vec<String>,
+}
+
+impl<T> Best<T> {
+    pub fn new() -> Self {
+        Self {
+            kept: None,
+            reasons: Vec::new(),
+            failure: None,
+            error: None,
+            present: Failure::default(),
+            of_key: None,
         }
-        Err(reason) => Err(NoPlan {
+    }
+
+    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far; of equals the earlier
+    /// stays.
+    pub fn offer(
+        &mut self,
+        end: T,
+        (grade, faults): (Grade, Vec<String>),
+        key: Option<KeySite>,
+        wall: &Arc<Wall>,
+    ) {
+        if self
+            .of_key
+            .as_ref()
+            .is_none_or(|(best, _)| grade.is_better_than(best))
+        {
+            self.of_key = Some((grade, faults));
+        }
+        if self
+            .kept
+            .as_ref()
+            .is_none_or(|kept| grade.is_better_than(&kept.grade))
+        {
+            self.kept = Some(Kept {
+                end,
+                grade,
+                key,
+                wall: wall.clone(),
+                reasons: self.reasons.clone(),
+            });
+        }
+    }
+
+    /// Keeps the reason why the present trial fails.
+    pub fn fail(&mut self, failure: Failure) {
+        if !failure.reason.is_empty() {
+            self.present = failure;
+        }
+    }
+
+    /// Closes a key: its failure becomes a reason for people, or the failure of the job.
+    pub fn close_key(&mut self, ctx: &Ctx, site: Option<&KeySite>) {
+        let failure = std::mem::take(&mut self.present);
+        let kit = self.of_key.take().map(|(_, faults)| faults);
+        let Some(site) = site else {
+            if kit.is_none() && !failure.reason.is_empty() {
+                self.failure.get_or_insert(failure);
+            }
+            return;
+        };
+        let words = candidate::words(site);
+        let reason = match kit {
+            Some(faults) if faults.is_empty() => return,
+            Some(faults) => format!("{words}: {}", plainly(&faults)),
+            None if failure.reason.is_empty() => return,
+            None => format!("{words}: no plan, as {}", failure.reason),
+        };
+        self.reject(ctx, reason);
+    }
+
+    /// Closes a key that cannot be made. The error is the job's only if a piece is the key and no kit was made.
+    pub fn close_key_with(&mut self, ctx: &Ctx, site: Option<&KeySite>, error: DesignError) {
+        (self.present, self.of_key) = (Failure::default(), None);
+        match site {
+            Some(site) => self.reject(ctx, format!("{} cannot be made: {error}", candidate::words(site))),
+            None => {
+                if self.has_end() {
+                    ctx.note(&format!("with a piece as the key it cannot be made: {error}"));
+                }
+                self.error = Some(error);
+            }
+        }
+    }
+
+    pub fn has_end(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// Reason to divide in another way, for people.
+    pub fn words(&self) -> String {
+        match (&self.kept, &self.error) {
+            (Some(_), _) => "no kit of these pieces passes".to_owned(),
+            (None, Some(error)) => format!("these pieces cannot be made: {error}"),
+            (None, None) => "these pieces have no plan".to_owned(),
+        }
+    }
+
+    /// Begins another wall, whose keys fail for reasons of their own.
+    pub fn begin_wall(&mut self) {
+        self.reasons.clear();
+    }
+
+    /// Returns the best end; fails with the error of the job if there is none.
+    pub fn into_end(self) -> Result<Option<T>, DesignError> {
+        match (self.kept, self.error) {
+            (Some(kept), _) => Ok(Some(kept.end)),
+            (None, Some(error)) => Err(error),
+            (None, None) => Ok(None),
+        }
+    }
+
+    fn reject(&mut self, ctx: &Ctx, reason: String) {
+        ctx.note(&reason);
+        self.reasons.push(reason);
+    }
+
+    /// Reason why there is no end: a failure, else an error, else nothing but a lack of time.
+    fn why(self) -> Result<Failure, DesignError> {
+        match (self.failure, self.error) {
+            (Some(failure), _) => Ok(failure),
+            (None, Some(error)) => Err(error),
+            (None, None) => Ok(self.present),
+        }
+    }
+}
+
+impl Best<Planned> {
+    /// Concludes a job that seeks a plan.
+    pub fn conclude(self, agenda: &Agenda) -> Result<Result<Planned, NoPlan>, DesignError> {
+        let is_cut_short = agenda.is_cut_short();
+        if let Some(kept) = self.kept {
+            let mut planned = kept.end;
+            planned.warnings.extend(is_cut_short.then(|| time_up(0)));
+            return Ok(Ok(planned));
+        }
+        let reason = match self.why() {
+            Ok(failure) => failure.reason,
+            Err(error) if is_cut_short => error.to_string(),
+            Err(error) => return Err(error),
+        };
+        Ok(Err(NoPlan {
             reason: if is_cut_short {
                 report_lateness(&reason)
             } else {
                 reason
             },
             is_cut_short,
-        }),
+        }))
     }
 }
 
-impl DesignOutcome {
-    pub(super) fn kit(&self) -> Option<&Kit> {
-        match self {
-            Self::Made(design) => Some(&design.kit),
-            Self::NoPlan { .. } => None,
-        }
-    }
-
-    /// Whether it has a kit where the other has none, or a better one.
-    pub(super) fn is_better_than(&self, other: &Self) -> bool {
-        let is_better = |kit: &Kit| other.kit().is_none_or(|other| kit.is_better_than(other));
-        self.kit().is_some_and(is_better)
-    }
-}
-
-/// The best kit so far, and why the keys that were cut did not do.
-#[derive(Default)]
-pub(super) struct Best<'a> {
-    kit: Option<Kept<'a>>,
-    /// Why keys that were cut fail, for people.
-    reasons: Vec<String>,
-    /// How many of their kits fail by pieces that rattle alone.
-    n_rattling: usize,
-    /// Why there is no plan where a piece is the key.
-    failure: Failure,
-}
-
-/// A kit and what it was made for.
-struct Kept<'a> {
-    kit: Kit,
-    candidate: Candidate<'a>,
-}
-
-impl<'a> Best<'a> {
-    pub fn has_kit(&self) -> bool {
-        self.kit.is_some()
-    }
-
-    /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that
-    /// was cut.
-    pub fn is_enough(&self, place: Option<&KeySite>) -> bool {
-        let is_enough = |kit: &Kit| kit.is_firm() || (place.is_none() && kit.only_rattles());
-        let rattles = place.is_some() && self.n_rattling == RATTLING_KEYS;
-        rattles || self.kit.as_ref().is_some_and(|kept| is_enough(&kept.kit))
-    }
-
-    /// Keeps the kit of a candidate where it is better; says why it will not do. What goes wrong with a key
-    /// that is cut need not with another.
-    pub fn add(
-        &mut self,
+impl Best<Kit> {
+    /// Concludes a job: measures what is left to know of the best kit, and collects its warnings.
+    pub fn conclude(
+        self,
         ctx: &Ctx,
-        place: Option<&KeySite>,
-        candidate: Candidate<'a>,
-        explored: Result<Explored, DesignError>,
-    ) -> Result<(), DesignError> {
-        let Some(site) = place else {
-            let Explored { kit, failure, .. } = match explored {
-                Err(e) if self.kit.is_some() && !matches!(e, DesignError::Cancelled(_)) => {
-                    // A kit with a key that was cut is there, if it fails.
-                    ctx.note(&format!("with a piece as the key it cannot be made: {e}"));
-                    return Ok(());
-                }
-                explored => explored?,
+        input: &Input<'_>,
+        agenda: &Agenda,
+        effort: Effort,
+    ) -> Result<DesignOutcome, DesignError> {
+        let is_cut_short = agenda.is_cut_short();
+        let Some(kept) = self.kept else {
+            let failure = match self.why() {
+                // Other pieces that were left out might have been made.
+                Err(error) if is_cut_short => Failure::of(&error.to_string()),
+                why => why?,
             };
-            self.failure = failure;
-            if let Some(kit) = kit {
-                self.keep(kit, candidate);
-            }
-            return Ok(());
-        };
-        let words = candidate::words(site);
-        let reason = match explored {
-            Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
-            Err(e) => format!("{words} cannot be made: {e}"),
-            Ok(Explored {
-                kit: None, failure, ..
-            }) => {
-                format!("{words}: no plan, as {}", failure.reason)
-            }
-            Ok(Explored { kit: Some(kit), .. }) => {
-                let failed = kit.failures();
-                // Where other pieces than the key rattle, another key changes little.
-                self.n_rattling += usize::from(kit.only_rattles() && !kit.rattling().is_empty());
-                self.keep(kit, candidate);
-                if failed.is_empty() {
-                    return Ok(());
-                }
-                format!("{words}: {}", plainly(&failed))
-            }
-        };
-        ctx.note(&reason);
-        self.reasons.push(reason);
-        Ok(())
-    }
-
-    /// Keeps the kit where it is better than the best before; of equals the earlier stays.
-    fn keep(&mut self, kit: Kit, candidate: Candidate<'a>) {
-        if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
-            self.kit = Some(Kept { kit, candidate });
-        }
-    }
-
-    /// The best kit with all that is known of it, after so much `effort`.
-    pub fn finished(self, ctx: &Ctx, job: &Job<'_>, effort: Effort) -> Result<DesignOutcome, DesignError> {
-        let Self {
-            kit,
-            mut reasons,
-            failure: Failure { reason, blockers, .. },
-            ..
-        } = self;
-        let Some(Kept { kit, candidate }) = kit else {
             return Ok(DesignOutcome::NoPlan {
-                reason,
-                blockers,
-                is_cut_short: false,
+                reason: if is_cut_short {
+                    report_lateness(&failure.reason)
+                } else {
+                    failure.reason
+                },
+                blockers: failure.blockers,
+                is_cut_short,
             });
         };
-        let key = candidate.key.map(|key| key.given);
-        let gaps = kit_gaps(
-            ctx,
-            Some(job.model),
-            &kit.pieces,
-            &kit.plan,
-            job.settings().body.rim_mm,
-        )?;
-        let fit = PrintedFit::of(ctx, &kit, &gaps)?;
-        let least_wall_mm = job.settings().connector.min_wall_mm;
-        let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
-        let thin: IdVec<PatchId, Vec<ThinFeature>> = kit.pieces.as_slice().iter().map(thin).collect();
-        let ctx = ctx.fork();
-        segmentation::tell(
-            &ctx,
-            &job.settings().segmentation,
-            job.model,
-            job.labels,
-            &kit.surface,
-        )?;
-        let mut warnings = ctx.into_warnings();
-        warnings.extend(kit.warnings.iter().cloned());
-        warnings.extend(job.wall.warnings.iter().cloned());
-        warnings.extend(crossing(&kit, &gaps));
-        warnings.extend(thin_in_all(&thin));
-        match &key {
-            Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, key)),
-            None if job.params.key.is_cut() => {
-                if reasons.is_empty() {
-                    reasons.push(match job.params.key {
-                        KeySource::CutNear(_) => {
-                            "the surface is not flat, free and thick enough near the place that you chose"
-                                .into()
-                        }
-                        _ => "nowhere is the surface flat, free and thick enough to cut one".into(),
-                    });
-                }
-                warnings.push(not_cut(&kit, reasons));
+        let mut design = finish(ctx, input, kept, effort)?;
+        design
+            .warnings
+            .extend(is_cut_short.then(|| time_up(design.effort.kits)));
+        Ok(DesignOutcome::Made(Box::new(design)))
+    }
+}
+
+/// Measures gaps, thin places and the play of printed pieces of a kit, and collects its warnings.
+fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Result<Design, DesignError> {
+    let Kept {
+        end: kit,
+        key,
+        wall,
+        reasons,
+        ..
+    } = kept;
+    let settings = wall.settings.clone();
+    let gaps = kit_gaps(
+        ctx,
+        Some(input.model),
+        &kit.pieces,
+        &kit.plan,
+        settings.body.rim_mm,
+    )?;
+    let fit = PrintedFit::of(ctx, &kit, &gaps)?;
+    let least_wall_mm = settings.connector.min_wall_mm;
+    let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
+    let thin: IdVec<PatchId, Vec<ThinFeature>> = kit.pieces.as_slice().iter().map(thin).collect();
+    let ctx = ctx.fork();
+    segmentation::tell(
+        &ctx,
+        &settings.segmentation,
+        input.model,
+        input.labels,
+        &kit.surface,
+    )?;
+    let mut warnings = ctx.into_warnings();
+    warnings.extend(kit.warnings.iter().cloned());
+    warnings.extend(wall.warnings());
+    warnings.extend(crossing(&kit, &gaps));
+    warnings.extend(thin_in_all(&thin));
+    warnings.extend(key_warning(input, &kit, key.as_ref(), reasons));
+    Ok(Design {
+        kit,
+        settings,
+        key,
+        strength: wall.strength.clone(),
+        gaps,
+        fit,
+        thin,
+        effort,
+        warnings,
+    })
+}
+
+/// Warns of a cut key that slides on nothing, or of a piece that is the key since none could be cut.
+fn key_warning(
+    input: &Input<'_>,
+    kit: &Kit,
+    key: Option<&KeySite>,
+    mut reasons: Vec<String>,
+) -> Option<Warning> {
+    match key {
+        Some(key) => (kit.rails_mm() <= 0.0).then(|| without_rails(kit, key)),
+        None if !input.params.key.is_cut() => None,
+        None => {
+            if reasons.is_empty() {
+                reasons.push(match input.params.key {
+                    KeySource::CutNear(_) => {
+                        "the surface is not flat, free and thick enough near the place that you chose".into()
+                    }
+                    _ => "nowhere is the surface flat, free and thick enough to cut one".into(),
+                });
             }
-            _ => {}
+            Some(not_cut(kit, reasons))
         }
-        let strength = job.wall.strength.clone();
-        Ok(DesignOutcome::Made(Box::new(Design {
-            kit,
-            settings: job.settings().clone(),
-            key,
-            strength,
-            gaps,
-            fit,
-            thin,
-            effort,
-            warnings,
-        })))
     }
 }
 

@@ -1,165 +1,29 @@
-//! The loop, its budgets and lessons, with kits that are made up.
+//! The loop and its lessons, with kits that are made up.
 
-use std::borrow::Cow;
+mod kits;
+
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_geom::{Solid, Vec3};
 
+use super::attempt::Failure;
 use super::handover::Handover;
 use super::lesson::{Lesson, lessons};
+use super::trial::Job;
 use super::*;
 use crate::body::BodyError;
 use crate::connector::SeamRoom;
 use crate::context::Progress;
 use crate::key::{KeyPrism, KeySite, Turn};
-use crate::metric::{ChoiceError, Holding};
+use crate::metric::ChoiceError;
 use crate::piece::PieceError;
-use crate::plan::key::KeyDirections;
-use crate::plan::{LatticePlan, PlanConstraints, PlanProof, ProofScope};
-use crate::play::{KitPlay, Rattle, Slide};
+use crate::plan::PlanConstraints;
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
-use crate::verify::{Check, Finding, Play, Verification};
-use crate::{Cancelled, Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, testing};
-
-const N: usize = 3;
-
-fn ids() -> impl Iterator<Item = PatchId> {
-    (0..N).map(PatchId::from)
-}
-
-fn check(name: &str, ok: bool) -> Check {
-    Check {
-        name: name.into(),
-        ok,
-        figure: String::new(),
-    }
-}
-
-/// A kit of three pieces, the last of them the key, that has these checks and findings.
-fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
-    handed_over(
-        Handover::new(&Turn::default(), found_plan([0, 1, 2])),
-        checks,
-        findings,
-    )
-}
-
-/// Patches in this order, all of which leave upwards.
-fn found_plan(order: [u32; N]) -> LatticePlan {
-    let up = LatticeDirection::nearest(Vec3::Z);
-    LatticePlan::new(order.map(|patch| (PatchId(patch), up)))
-}
-
-fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
-    let plan = handover.plan();
-    let slide = Slide {
-        key: plan.key(),
-        seat: PatchId(0),
-        at: [0.0; 3],
-        along: [0.0, 0.0, 1.0],
-        most_mm: 0.3,
-    };
-    let nothing = || ids().map(|_| None).collect::<IdVec<PatchId, Option<Play>>>();
-    Kit {
-        surface: testing::voronoi(testing::sphere(2, Vec3::splat(20.0)), N, 1),
-        sizes: ConnectorSizes::default(),
-        plan,
-        proof: PlanProof {
-            cost: 1.0,
-            lower_bound: 1.0,
-            gap: 0.0,
-            optimal: true,
-            least_cost: 1.0,
-            key_lower_bound: 1.0,
-            proven_for: ProofScope {
-                keys: Vec::new(),
-                slides: KeyDirections::WithinPlane,
-                n_lessons: 0,
-            },
-            piece_costs: ids().map(|_| 1.0).collect(),
-        },
-        holding: Holding {
-            quality_mm: None,
-            loose: Vec::new(),
-            seams: Vec::new(),
-            n_compared: 1,
-            bears: Vec::new(),
-            foreseen_play: Vec::new(),
-            foreseen_excess: Vec::new(),
-        },
-        deformed: crate::metric::Deformed::default(),
-        thickness_mm: 2.0,
-        pieces: ids().map(|_| TriMesh::default()).collect(),
-        joints: Vec::new(),
-        press_fits: Vec::new(),
-        contacts: Vec::new(),
-        verification: Verification {
-            checks: checks.iter().map(|&(name, ok)| check(name, ok)).collect(),
-            findings,
-        },
-        touching: Vec::new(),
-        rattles: Vec::new(),
-        play: KitPlay {
-            slide,
-            bearings: Vec::new(),
-            alone: nothing(),
-            estimates: nothing(),
-            swings: ids().map(|_| Vec::new()).collect(),
-            ways_out: None,
-            together: None,
-            proofs: Vec::new(),
-        },
-        warnings: vec![Warning {
-            cause: Cause::KeyWithoutGrip,
-            pieces: Vec::new(),
-            at: None,
-        }],
-        handover,
-    }
-}
-
-pub(super) fn good() -> Kit {
-    kit(&[("holds", true)], Vec::new())
-}
-
-pub(super) fn rattling(piece: u32, translation_mm: f64) -> Kit {
-    let play = Play {
-        translation_mm,
-        rotation_deg: 0.0,
-        is_proven: false,
-    };
-    let (piece, at) = (PatchId(piece), [0.0; 3]);
-    let rattle = Rattle {
-        piece,
-        play,
-        most: [1.0, 2.0],
-        excess: translation_mm,
-        at,
-    };
-    let finding = Finding::PlayTooWide {
-        piece,
-        play,
-        most: [2.0, 4.0],
-        at,
-    };
-    let is_loose = translation_mm > 2.0;
-    let findings = if is_loose { vec![finding] } else { Vec::new() };
-    Kit {
-        rattles: vec![rattle],
-        ..kit(&[("holds", true), ("sits", !is_loose)], findings)
-    }
-}
-
-pub(super) fn loose(piece: u32) -> Kit {
-    kit(
-        &[("holds", false), ("sits", true)],
-        vec![Finding::Loose {
-            piece: PatchId(piece),
-            directions: Vec::new(),
-        }],
-    )
-}
+use crate::verify::Finding;
+use crate::{Cancelled, Cause, LatticeDirection, PatchId, testing};
+use kits::*;
 
 #[test]
 fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
@@ -197,30 +61,6 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
             .iter()
             .all(|s| matches!(s, Err(SegmentationError::Cancelled(_))))
     );
-}
-
-#[test]
-fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
-    let two_failures = kit(&[("holds", false), ("sits", false)], Vec::new());
-    let mut best = None;
-    for (made, keeps) in [
-        (two_failures, true),
-        (loose(1), true),
-        // As many failures, and it rattles besides.
-        (rattling(1, 3.0), false),
-        (loose(0), false),
-        (good(), true),
-        (good(), false),
-    ] {
-        let mut made = made;
-        made.thickness_mm = 9.0;
-        best.iter_mut().for_each(|kit: &mut Kit| kit.thickness_mm = 2.0);
-        attempt::keep(&mut best, made);
-        assert_eq!(best.as_ref().unwrap().thickness_mm == 9.0, keeps);
-    }
-    let mut best = Some(rattling(1, 3.0));
-    attempt::keep(&mut best, rattling(0, 2.5));
-    assert_eq!(best.unwrap().rattling(), [PatchId(0)]);
 }
 
 #[test]
@@ -336,83 +176,60 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     );
 }
 
-/// A job on a ball, of which no kit is made.
+/// Job on a ball of which no kit is made.
 pub(super) struct Ball {
     pub model: Solid,
     pub params: Params,
-    pub wall: Wall,
 }
 
 impl Ball {
     pub fn new() -> Self {
-        let params = Params::default();
-        let told = Warning {
-            cause: Cause::StrengthUnknown {
-                error: String::new(),
-                thickness_mm: 2.0,
-            },
-            pieces: Vec::new(),
-            at: None,
-        };
-        let wall = Wall {
-            settings: Settings::resolve(&params),
-            strength: None,
-            warnings: vec![told],
-        };
         Self {
-            model: Solid::new(testing::sphere(2, Vec3::splat(20.0))).unwrap(),
-            params,
-            wall,
+            model: Solid::new(testing::sphere(3, Vec3::splat(40.0))).unwrap(),
+            params: Params::default(),
         }
     }
 
-    pub fn job(&self) -> Job<'_> {
-        let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
-        Job {
-            ask: Ask {
-                factor: 1.0,
-                rounds: self.params.rounds,
-                n_thicker: 1,
-            },
-            may_thicken: true,
-            pace: Pace::default(),
-            begun_s: 0.0,
+    pub fn input(&self) -> Input<'_> {
+        Input {
             params: &self.params,
             model: &self.model,
             labels: None,
-            wall: &self.wall,
-            stress: None,
-            surface,
-            key_faces: None,
         }
     }
 
-    pub fn candidate(&self) -> Candidate<'_> {
-        Candidate {
-            turn: Turn::default(),
-            model: Cow::Borrowed(&self.model),
-            surface: self.job().surface,
-            key: None,
-            budget: Budget::of_piece(&self.params.rounds),
-        }
+    /// The ball in `n` pieces.
+    pub fn job(&self, n: usize) -> Job<'_> {
+        let surface = testing::voronoi(self.model.mesh().clone(), n, 1);
+        let mut wall = Wall::nominal(&self.params);
+        wall.error = Some("a test".to_owned());
+        Job::of(self.input(), Arc::new(wall), surface).expect("no key is named")
     }
 
-    /// The outcome of kits that are made one after the other for these places.
-    pub fn outcome(
+    /// Concludes a job that made these kits for these places, one after the other.
+    pub fn conclude(
         &self,
-        tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>,
-    ) -> (Vec<bool>, Option<Design>) {
-        let (ctx, mut best, mut needed) = (Ctx::quiet(), Best::default(), Vec::new());
-        for (place, explored) in tried {
-            needed.push(!best.is_enough(place.as_ref()));
-            if needed[needed.len() - 1] {
-                best.add(&ctx, place.as_ref(), self.candidate(), explored)
-                    .unwrap();
+        kits: Vec<(Option<KeySite>, Result<Kit, DesignError>)>,
+    ) -> Result<DesignOutcome, DesignError> {
+        let (ctx, mut best, job) = (Ctx::quiet(), Best::new(), self.job(N));
+        for (site, kit) in kits {
+            match kit {
+                Ok(kit) => {
+                    let grade = (kit.grade(), kit.failures());
+                    best.offer(kit, grade, site, &job.wall);
+                    best.close_key(&ctx, site.as_ref());
+                }
+                Err(error) => best.close_key_with(&ctx, site.as_ref(), error),
             }
         }
-        match best.finished(&ctx, &self.job(), Effort::default()).unwrap() {
-            DesignOutcome::Made(design) => (needed, Some(*design)),
-            DesignOutcome::NoPlan { .. } => (needed, None),
+        let agenda = Agenda::new(&ctx, &self.input());
+        best.conclude(&ctx, &self.input(), &agenda, Effort::default())
+    }
+
+    fn design(&self, kits: Vec<(Option<KeySite>, Result<Kit, DesignError>)>) -> Design {
+        match self.conclude(kits) {
+            Ok(DesignOutcome::Made(design)) => *design,
+            _ => panic!("a kit was made"),
         }
     }
 }
@@ -437,84 +254,30 @@ pub(super) fn site() -> KeySite {
     }
 }
 
-pub(super) fn made(kit: Kit) -> Result<Explored, DesignError> {
-    Ok(Explored {
-        kit: Some(kit),
-        ..Explored::default()
-    })
-}
-
 pub(super) fn codes(design: &Design) -> Vec<&str> {
     design.warnings.iter().map(|w| w.code()).collect()
 }
 
 #[test]
-fn a_kit_that_passes_ends_the_job() {
-    let (needed, design) =
-        Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
-    assert_eq!(needed, [true, false]);
-    assert!(design.unwrap().kit.verification.passed());
+fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
+    let worse = || kit(&[("holds", false), ("closed", false)], Vec::new());
+    // As many failures: the one that rattles less, and of equals the earlier.
+    for (first, second, is_second) in [
+        (loose(1), loose(0), false),
+        (loose_and_rattling(1, 1.5), loose_and_rattling(0, 2.5), false),
+        (loose_and_rattling(1, 2.5), loose_and_rattling(0, 1.5), true),
+        (loose(1), worse(), false),
+        (worse(), loose(0), true),
+        (loose(1), good(), true),
+        (rattling(1, 1.5), loose(0), false),
+    ] {
+        let better = if is_second { second.clone() } else { first.clone() };
+        let made = Ball::new().design(vec![(Some(site()), Ok(first)), (None, Ok(second))]);
+        assert_eq!(made.kit.verification.findings, better.verification.findings);
+    }
 }
 
-#[test]
-fn a_kit_that_rattles_and_is_not_loose_passes_where_no_firm_one_is_found() {
-    let rattles = || (Some(site()), made(rattling(1, 1.5)));
-    let (needed, design) = Ball::new().outcome(vec![rattles(), (Some(site()), made(good()))]);
-    assert_eq!(needed, [true, true], "a firmer one is looked for");
-    assert!(design.unwrap().kit.is_firm());
-    let (_, design) = Ball::new().outcome(vec![rattles(), (None, made(loose(1)))]);
-    let kit = design.unwrap().kit;
-    assert!(kit.verification.passed() && !kit.is_firm());
-}
-
-#[test]
-fn keys_whose_kits_only_rattle_are_two_and_no_piece_is_tried_as_the_key() {
-    let rattles = || (Some(site()), made(rattling(1, 3.0)));
-    let (needed, design) = Ball::new().outcome(vec![rattles(), rattles(), rattles(), (None, made(good()))]);
-    assert_eq!(needed, [true, true, false, false]);
-    assert!(design.unwrap().kit.only_rattles());
-}
-
-#[test]
-fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
-    let impossible = || (Some(site()), Err(DesignError::Choice(ChoiceError::NoPlan)));
-    let (_, design) = Ball::new().outcome(vec![impossible(), (None, made(good()))]);
-    let design = design.unwrap();
-    let told = design
-        .warnings
-        .iter()
-        .find(|w| w.code() == "key-not-cut")
-        .expect("it is told");
-    assert!(
-        told.to_string().contains("cannot be made"),
-        "{}",
-        told.to_string()
-    );
-    assert!(
-        Best::default()
-            .add(
-                &Ctx::quiet(),
-                Some(&site()),
-                Ball::new().candidate(),
-                Err(Cancelled.into())
-            )
-            .is_err()
-    );
-}
-
-#[test]
-fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
-    let impossible = || Err(DesignError::Choice(ChoiceError::NoPlan));
-    let (_, design) = Ball::new().outcome(vec![(Some(site()), made(loose(1))), (None, impossible())]);
-    assert_eq!(
-        design.unwrap().kit.verification.findings,
-        loose(1).verification.findings
-    );
-    let alone = Best::default().add(&Ctx::quiet(), None, Ball::new().candidate(), impossible());
-    assert!(alone.is_err(), "without any kit the job cannot be done");
-}
-
-/// A kit that comes loose and whose pieces rattle by so much besides.
+/// Kit that comes loose and whose pieces rattle besides.
 fn loose_and_rattling(piece: u32, excess: f64) -> Kit {
     let rattles = rattling(piece, excess).rattles;
     Kit {
@@ -523,75 +286,192 @@ fn loose_and_rattling(piece: u32, excess: f64) -> Kit {
     }
 }
 
-#[test]
-fn the_better_of_two_kits_is_given_out_whichever_key_it_has_and_of_equals_the_earlier() {
-    let ball = Ball::new();
-    let given_out = |cut: Kit, piece: Kit| {
-        let tried = vec![(Some(site()), made(cut)), (None, made(piece))];
-        let kit = ball.outcome(tried).1.expect("a kit was made").kit;
-        kit.verification.findings
-    };
-    let first = |kit: Kit| kit.verification.findings;
-    let worse = || kit(&[("holds", false), ("closed", false)], Vec::new());
-    // As many failures: the one that rattles less, and of equals the earlier.
-    for (cut, piece, is_piece) in [
-        (loose(1), loose(0), false),
-        (loose_and_rattling(1, 1.5), loose_and_rattling(0, 2.5), false),
-        (loose_and_rattling(1, 2.5), loose_and_rattling(0, 1.5), true),
-        (loose(1), worse(), false),
-        (worse(), loose(0), true),
-    ] {
-        let better = first(if is_piece { piece.clone() } else { cut.clone() });
-        assert_eq!(piece.is_better_than(&cut), is_piece);
-        assert_eq!(given_out(cut, piece), better);
-    }
+fn impossible() -> Result<Kit, DesignError> {
+    Err(DesignError::Choice(ChoiceError::NoPlan))
 }
 
 #[test]
-fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
+fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
+    let design = Ball::new().design(vec![(Some(site()), impossible()), (None, Ok(good()))]);
+    let not_cut = design
+        .warnings
+        .iter()
+        .find(|w| w.code() == "key-not-cut")
+        .expect("there is a warning");
+    assert!(
+        not_cut.to_string().contains("cannot be made"),
+        "{}",
+        not_cut.to_string()
+    );
+}
+
+#[test]
+fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
+    let design = Ball::new().design(vec![(Some(site()), Ok(loose(1))), (None, impossible())]);
+    assert_eq!(design.kit.verification.findings, loose(1).verification.findings);
+    let alone = Ball::new().conclude(vec![(None, impossible())]);
+    assert!(alone.is_err(), "without any kit the job cannot be done");
+}
+
+#[test]
+fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_kept() {
     let mut other = loose(1);
     other.warnings[0].cause = Cause::KeyWithoutRibs;
-    let (_, design) = Ball::new().outcome(vec![(Some(site()), made(other)), (None, made(good()))]);
-    let design = design.unwrap();
+    let design = Ball::new().design(vec![(Some(site()), Ok(other)), (None, Ok(good()))]);
     let all = codes(&design);
-    assert!(
-        all.contains(&"key-without-grip")
-            && all.contains(&"strength-unknown")
-            && all.contains(&"key-not-cut"),
-        "{all:?}"
-    );
+    for code in ["key-without-grip", "strength-unknown", "key-not-cut"] {
+        assert!(all.contains(&code), "{code}: {all:?}");
+    }
     assert!(!all.contains(&"key-without-ribs"));
 }
 
 #[test]
-fn the_settings_of_a_design_have_the_wall_that_was_decided() {
-    let mut ball = Ball::new();
-    ball.params.thickness = Thickness::Auto;
-    ball.wall.settings = Settings::with_thickness(&ball.params, 1.3);
-    assert_ne!(Settings::resolve(&ball.params), ball.wall.settings);
-    let (_, design) = ball.outcome(vec![(None, made(good()))]);
-    assert_eq!(design.unwrap().settings, ball.wall.settings);
+fn without_any_plan_the_answer_is_the_failure_with_a_piece_as_the_key() {
+    let (ctx, ball) = (Ctx::quiet(), Ball::new());
+    let mut best: Best<Kit> = Best::new();
+    best.fail(Failure::of("the cut key is in the way"));
+    best.close_key(&ctx, Some(&site()));
+    best.fail(Failure::of("all are in each other's way"));
+    best.close_key(&ctx, None);
+    best.fail(Failure::of("a later way failed as well"));
+    best.close_key(&ctx, None);
+    let agenda = Agenda::new(&ctx, &ball.input());
+    let Ok(DesignOutcome::NoPlan { reason, .. }) =
+        best.conclude(&ctx, &ball.input(), &agenda, Effort::default())
+    else {
+        panic!("no kit was made")
+    };
+    assert_eq!(reason, "all are in each other's way");
+}
+
+/// Runs the loop on a ball whose labels are its two halves, which never lock.
+fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
+    let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
+    let mesh = model.mesh();
+    let is_upper = |face| i64::from(mesh.face_center(face).z > 0.0);
+    let labels: Vec<i64> = (0..mesh.triangles.len()).map(is_upper).collect();
+    let input = Input {
+        params,
+        model: &model,
+        labels: Some(&labels),
+    };
+    let (mut trial, mut agenda) = (Trial::new(input, Wall::nominal(params)), Agenda::new(ctx, &input));
+    let best = explore(ctx, &mut agenda, &mut trial, attempt::make_kit, |kit: &Kit| {
+        (kit.grade(), kit.failures())
+    });
+    let effort = trial.effort;
+    (
+        best.and_then(|best| best.conclude(ctx, &input, &agenda, effort.clone())),
+        effort,
+    )
+}
+
+/// Parameters by which a piece is the key and nothing is divided again.
+fn at_once() -> Params {
+    let mut params = Params {
+        key: KeySource::Flattest,
+        ..Params::default()
+    };
+    params.rounds.refinements = 0;
+    params
 }
 
 #[test]
-fn without_any_plan_the_answer_is_why() {
-    let failure = || Failure {
-        reason: "all are in each other's way".into(),
-        ..Failure::default()
+fn work_that_leads_to_no_plan_or_to_an_error_counts() {
+    let in_vain = Effort {
+        keys: 1,
+        segmentations: 1,
+        plans: 1,
+        ..Effort::default()
     };
-    let none = || {
-        Ok(Explored {
-            failure: failure(),
-            ..Explored::default()
-        })
+    let (outcome, effort) = halves(&Ctx::quiet(), &at_once());
+    assert!(matches!(outcome, Ok(DesignOutcome::NoPlan { .. })));
+    assert_eq!(effort, in_vain);
+    let too_fine = Params {
+        cell_mm: Some(1e-4),
+        ..at_once()
     };
+    let (outcome, effort) = halves(&Ctx::quiet(), &too_fine);
+    assert!(matches!(outcome, Err(DesignError::Grid(_))));
+    assert_eq!(effort, in_vain);
+}
+
+#[test]
+fn pieces_that_are_not_divided_again_for_want_of_time_are_reported() {
+    let none = || 0.0;
+    let late = Ctx::quiet().with_deadline(&none);
+    let is_cut_short = |ctx: &Ctx, refinements| {
+        let mut params = at_once();
+        params.rounds.refinements = refinements;
+        match halves(ctx, &params).0 {
+            Ok(DesignOutcome::NoPlan {
+                is_cut_short, reason, ..
+            }) => {
+                assert_eq!(reason.contains("(--time)"), is_cut_short, "{reason}");
+                is_cut_short
+            }
+            _ => panic!("two halves never lock"),
+        }
+    };
+    assert!(is_cut_short(&late, 1));
+    assert!(!is_cut_short(&late, 0), "nothing was left to try");
+    assert!(!is_cut_short(&Ctx::quiet(), 0));
+}
+
+#[test]
+fn a_half_is_divided_if_two_pieces_cannot_lock() {
     let ball = Ball::new();
-    let (ctx, mut best) = (Ctx::quiet(), Best::default());
-    best.add(&ctx, Some(&site()), ball.candidate(), none()).unwrap();
-    best.add(&ctx, None, ball.candidate(), none()).unwrap();
-    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job(), Effort::default()).unwrap()
-    else {
-        panic!("no kit")
+    assert_eq!(ball.job(2).surface.n_patches, 2);
+    let (ctx, input) = (Ctx::quiet(), ball.input());
+    let params = Params {
+        key: KeySource::Flattest,
+        ..Params::default()
     };
-    assert_eq!(reason, failure().reason);
+    let input_of_piece = Input {
+        params: &params,
+        ..input
+    };
+    let mut agenda = Agenda::new(&ctx, &input_of_piece);
+    let mut trial = Trial::new(input_of_piece, Wall::nominal(&params));
+    trial.take_division(Some(ball.job(2).surface));
+    assert!(trial.begin(&ctx, &mut agenda).expect("not stopped").is_none());
+    let allowance = agenda.allowance(&ctx);
+    let found = attempt::make_kit(&ctx, trial.parts(&agenda), &allowance).expect("not stopped");
+    let [Change::Divide(Step::Divide, surface, None)] = &found.changes[..] else {
+        panic!("a half can be divided")
+    };
+    assert!(
+        found.end.is_none() && surface.n_patches > 2,
+        "{}",
+        surface.n_patches
+    );
+}
+
+#[test]
+fn joined_pieces_count_as_another_division_only_if_they_can_be_made() {
+    let (ball, ctx) = (Ball::new(), Ctx::quiet());
+    let params = Params {
+        key: KeySource::Flattest,
+        ..Params::default()
+    };
+    let input = Input {
+        params: &params,
+        ..ball.input()
+    };
+    let mut agenda = Agenda::new(&ctx, &input);
+    let mut trial = Trial::new(input, Wall::nominal(&params));
+    trial.take_division(Some(ball.job(N).surface));
+    assert!(trial.begin(&ctx, &mut agenda).expect("not stopped").is_none());
+    assert_eq!(trial.effort.segmentations, 1);
+    let sizes = trial.parts(&agenda).setup.division.chosen.clone();
+    trial
+        .apply(&ctx, &mut agenda, Change::Enlarge(sizes))
+        .expect("not stopped");
+    assert_eq!(
+        trial.effort.segmentations, 1,
+        "other connectors in the same pieces"
+    );
+    let joined = Change::Divide(Step::JoinPredicted, ball.job(N).surface, None);
+    trial.apply(&ctx, &mut agenda, joined).expect("not stopped");
+    assert_eq!(trial.effort.segmentations, 2);
 }

@@ -1,116 +1,63 @@
-//! The wall that a kit is made with: as thick as a fall asks for, or thicker for the sake of use.
+//! The wall of a kit: as thick as a fall asks for, thicker for the sake of use, or as thin as walls are made.
 
-use std::borrow::Cow;
-
-use shellock_geom::Solid;
-
-use super::strengthen::Thicker;
 use super::ways::{Input, Way};
 use super::{DesignError, Params, Settings, Thickness};
 use crate::strength::{self, Strength, StrengthError};
 use crate::{Cause, Ctx, Warning};
 
-/// The wall's thickness in what stages are given, what it bears, and what to tell of it.
+/// Thickness of the wall in the stages' settings, and the facts that led to it.
 #[derive(Clone)]
 pub(super) struct Wall {
     pub settings: Settings,
     pub strength: Option<Strength>,
-    pub warnings: Vec<Warning>,
+    /// Error of the stress analysis, if it could not be done.
+    pub error: Option<String>,
+    /// True if the thickness is ours to choose.
+    is_free: bool,
+    /// True if the model is not divided by the method that was asked for.
+    is_divided_otherwise: bool,
+    /// Thickness that a fall asks for, and the reason for a thicker wall.
+    thicker: Option<(f64, Thicker)>,
+}
+
+/// Wall that is thicker for the sake of a use.
+#[derive(Clone, Debug)]
+pub(super) struct Thicker {
+    pub thickness_mm: f64,
+    /// The use that asks for it, as in "pressed on its top".
+    pub done: String,
 }
 
 impl Wall {
-    /// Whether it is thicker than a fall asks for, for the sake of use.
-    pub fn is_thicker(&self) -> bool {
-        let is_told = |w: &Warning| matches!(w.cause, Cause::WallForUse { .. });
-        self.warnings.iter().any(is_told)
-    }
-
-    /// The same for pieces that are cut in a way; where a person would not cut, though that was asked, it is told.
-    pub fn divided(&self, way: Way) -> Self {
-        let mut wall = self.clone();
-        let segmentation = &mut wall.settings.segmentation;
-        let is_other = way.method != segmentation.method;
-        (segmentation.method, segmentation.n_pieces) = (way.method, way.n_pieces);
-        wall.warnings.extend(is_other.then(|| Warning {
-            cause: Cause::DividedOtherwise,
-            pieces: Vec::new(),
-            at: None,
-        }));
-        wall
-    }
-
-    /// The same model with a wall as thin as is made, where that is ours to say: connectors have the most room.
-    pub fn thin(
-        &self,
-        ctx: &Ctx,
-        &Input { params, model, .. }: &Input<'_>,
-    ) -> Result<Cow<'_, Self>, DesignError> {
-        let thin_mm = self.settings.strength.thin_mm;
-        if params.thickness != Thickness::Auto || self.settings.body.thickness_mm <= thin_mm {
-            return Ok(Cow::Borrowed(self));
+    /// A wall as thick as `params` say, without an analysis of its stress.
+    pub fn nominal(params: &Params) -> Self {
+        Self {
+            settings: Settings::resolve(params),
+            strength: None,
+            error: None,
+            is_free: params.thickness == Thickness::Auto,
+            is_divided_otherwise: false,
+            thicker: None,
         }
-        let thickness = Thickness::Mm(thin_mm);
-        let params = Params {
-            thickness,
-            ..params.clone()
-        };
-        let mut wall = Self::decide(ctx, &params, model)?;
-        let told = wall
-            .strength
-            .as_ref()
-            .map(|s| s.told_thinner(&wall.settings.strength));
-        wall.warnings.extend(told.flatten());
-        Ok(Cow::Owned(wall))
     }
 
-    /// The same model with a thicker wall, for the sake of what people do to the kit.
-    pub fn thicker(
-        &self,
-        ctx: &Ctx,
-        &Input { params, model, .. }: &Input<'_>,
-        thicker: &Thicker,
-    ) -> Result<Self, DesignError> {
-        let thickness = Thickness::Mm(thicker.thickness_mm);
-        let mut wall = Self::decide(
-            ctx,
-            &Params {
-                thickness,
-                ..params.clone()
-            },
-            model,
-        )?;
-        let way = &self.settings.segmentation;
-        (
-            wall.settings.segmentation.method,
-            wall.settings.segmentation.n_pieces,
-        ) = (way.method, way.n_pieces);
-        wall.settings.strength.most_mm = self.settings.strength.most_mm;
-        let is_other = |w: &&Warning| matches!(w.cause, Cause::DividedOtherwise);
-        wall.warnings.extend(self.warnings.iter().find(is_other).cloned());
-        // The thinnest wall of those before stays the one that a fall asks for.
-        let is_told = |w: &&Warning| matches!(w.cause, Cause::WallForUse { .. });
-        let from_mm = match self.warnings.iter().find(is_told).map(|w| &w.cause) {
-            Some(Cause::WallForUse { from_mm, .. }) => *from_mm,
-            _ => self.settings.body.thickness_mm,
-        };
-        wall.warnings.push(thicker.warning(from_mm));
-        Ok(wall)
-    }
-
-    pub fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
-        let nominal = Settings::resolve(params);
+    /// Decides the thickness by the stress in a fall. Fails if the model is too thin for hollow pieces and connectors,
+    /// unless the user allows that.
+    pub fn decide(ctx: &Ctx, &Input { params, model, .. }: &Input<'_>) -> Result<Self, DesignError> {
+        let nominal = Self::nominal(params);
+        let ours = &nominal.settings.strength;
         if !params.allows_thin {
             let thinnest_mm = match params.thickness {
                 Thickness::Mm(mm) => mm,
-                Thickness::Auto => nominal.strength.thin_mm,
+                Thickness::Auto => ours.thin_mm,
             };
             strength::is_hollow(model, thinnest_mm)?;
             strength::has_room(model, thinnest_mm)?;
         }
         let ctx = &ctx.fork();
         let found = match params.thickness {
-            Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
-            Thickness::Auto => strength::thickness(ctx, &nominal.strength, model),
+            Thickness::Mm(mm) => strength::stress(ctx, ours, model, mm),
+            Thickness::Auto => strength::thickness(ctx, ours, model),
         };
         match found {
             Ok(strength) => {
@@ -119,35 +66,107 @@ impl Wall {
                 }
                 let mut settings = Settings::with_thickness(params, strength.thickness_mm);
                 settings.strength.most_mm = strength.most_mm;
-                let mut warnings = strength.warnings(&nominal.strength);
-                let is_ours = params.thickness == Thickness::Auto;
-                warnings.extend(
-                    is_ours
-                        .then(|| strength.told_thinner(&nominal.strength))
-                        .flatten(),
-                );
                 Ok(Self {
                     settings,
                     strength: Some(strength),
-                    warnings,
+                    ..nominal
                 })
             }
-            Err(StrengthError::Shell(e)) => {
-                let warning = Warning {
-                    cause: Cause::StrengthUnknown {
-                        error: e.to_string(),
-                        thickness_mm: nominal.body.thickness_mm,
-                    },
-                    pieces: Vec::new(),
-                    at: None,
-                };
-                Ok(Self {
-                    settings: nominal,
-                    strength: None,
-                    warnings: vec![warning],
-                })
-            }
+            Err(StrengthError::Shell(e)) => Ok(Self {
+                error: Some(e.to_string()),
+                ..nominal
+            }),
             Err(e) => Err(e.into()),
         }
+    }
+
+    /// This wall for pieces that are cut in another way.
+    pub fn divided(&self, way: Way) -> Self {
+        let mut wall = self.clone();
+        let segmentation = &mut wall.settings.segmentation;
+        wall.is_divided_otherwise |= way.method != segmentation.method;
+        (segmentation.method, segmentation.n_pieces) = (way.method, way.n_pieces);
+        wall
+    }
+
+    /// A wall of the same model as thin as walls are made, if the thickness is ours to choose.
+    pub fn thin(&self, ctx: &Ctx, input: &Input<'_>) -> Result<Self, DesignError> {
+        let thin_mm = self.settings.strength.thin_mm;
+        if !self.is_free || self.settings.body.thickness_mm <= thin_mm {
+            return Ok(self.clone());
+        }
+        self.with_thickness(ctx, input, thin_mm)
+    }
+
+    /// A thicker wall of the same model and the same division.
+    pub fn thicken(&self, ctx: &Ctx, input: &Input<'_>, thicker: Thicker) -> Result<Self, DesignError> {
+        let mut wall = self.with_thickness(ctx, input, thicker.thickness_mm)?;
+        let way = &self.settings.segmentation;
+        let segmentation = &mut wall.settings.segmentation;
+        (segmentation.method, segmentation.n_pieces) = (way.method, way.n_pieces);
+        wall.settings.strength.most_mm = self.settings.strength.most_mm;
+        wall.is_divided_otherwise = self.is_divided_otherwise;
+        // The thinnest wall so far remains the one that a fall asks for.
+        let from_mm = self
+            .thicker
+            .as_ref()
+            .map_or(self.settings.body.thickness_mm, |t| t.0);
+        wall.thicker = Some((from_mm, thicker));
+        Ok(wall)
+    }
+
+    fn with_thickness(&self, ctx: &Ctx, input: &Input<'_>, mm: f64) -> Result<Self, DesignError> {
+        let params = &Params {
+            thickness: Thickness::Mm(mm),
+            ..input.params.clone()
+        };
+        let wall = Self::decide(ctx, &Input { params, ..*input })?;
+        Ok(Self {
+            is_free: self.is_free,
+            ..wall
+        })
+    }
+
+    /// Warnings that follow from the facts.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let of_model = |cause| Warning {
+            cause,
+            pieces: Vec::new(),
+            at: None,
+        };
+        let params = &self.settings.strength;
+        let mut warnings = self.strength.as_ref().map_or(Vec::new(), |s| s.warnings(params));
+        warnings.extend(self.error.iter().map(|error| {
+            of_model(Cause::StrengthUnknown {
+                error: error.clone(),
+                thickness_mm: self.settings.body.thickness_mm,
+            })
+        }));
+        if self.is_free && self.thicker.is_none() {
+            let thinner = self.strength.as_ref().and_then(|s| s.told_thinner(params));
+            warnings.extend(thinner);
+        }
+        warnings.extend(
+            self.is_divided_otherwise
+                .then(|| of_model(Cause::DividedOtherwise)),
+        );
+        warnings.extend(self.thicker.as_ref().map(|(from_mm, thicker)| {
+            of_model(Cause::WallForUse {
+                from_mm: *from_mm,
+                to_mm: thicker.thickness_mm,
+                done: thicker.done.clone(),
+            })
+        }));
+        warnings
+    }
+}
+
+impl Thicker {
+    /// Describes the change for people.
+    pub fn words(&self) -> String {
+        format!(
+            "it would give way where it is {}: walls of {:.1} mm",
+            self.done, self.thickness_mm
+        )
     }
 }

@@ -1,0 +1,381 @@
+//! A trial: one division of the model with one key, one wall and one set of connectors, and what was learned of it.
+//!
+//! A change replaces one layer of the trial and all layers that are made from it; the others are kept.
+
+use std::sync::Arc;
+
+use super::agenda::{Agenda, CUT_KEYS, Effort, Step};
+use super::attempt::Failure;
+use super::candidate::{self, Candidate};
+use super::division::{Division, WallGrid};
+use super::lesson::Lesson;
+use super::wall::{Thicker, Wall};
+use super::ways::{Input, Walls, Way};
+use super::{DesignError, KeySource, Settings};
+use crate::key::KeySite;
+use crate::plan::{self, PlanConstraints, PlanSurvey};
+use crate::sizes::ChosenSizes;
+use crate::strength::StressMap;
+use crate::{Ctx, IdVec, PatchId, SegmentedSurface, Warning, segmentation};
+
+/// A change of a trial, with the data that it needs.
+pub(super) enum Change {
+    /// A step that needs no data.
+    Step(Step),
+    /// Connectors of other sizes in the same pieces.
+    Enlarge(ChosenSizes),
+    /// Other pieces, which one of the joining steps or [`Step::Divide`] made, and a warning of that.
+    Divide(Step, SegmentedSurface, Option<Warning>),
+    /// A thicker wall.
+    Thicken(Thicker),
+}
+
+impl Change {
+    pub fn step(&self) -> Step {
+        match self {
+            Self::Step(step) | Self::Divide(step, ..) => *step,
+            Self::Enlarge(_) => Step::Enlarge,
+            Self::Thicken(_) => Step::Thicken,
+        }
+    }
+}
+
+/// The model divided with one wall.
+pub(super) struct Job<'a> {
+    pub input: Input<'a>,
+    pub wall: Arc<Wall>,
+    pub surface: SegmentedSurface,
+    stress: Option<StressMap>,
+    /// Triangles of the model that the user wants in the key; `None` if the key is ours to choose.
+    key_faces: Option<Vec<bool>>,
+}
+
+impl<'a> Job<'a> {
+    /// Divides the model.
+    pub fn new(ctx: &Ctx, input: Input<'a>, wall: Arc<Wall>) -> Result<Self, DesignError> {
+        let params = &wall.settings.segmentation;
+        let surface = segmentation::segment(&ctx.fork(), params, input.model, input.labels)?;
+        Self::of(input, wall, surface)
+    }
+
+    /// Takes the model as it is divided already.
+    pub fn of(input: Input<'a>, wall: Arc<Wall>, surface: SegmentedSurface) -> Result<Self, DesignError> {
+        let stress = wall.strength.as_ref().map(StressMap::new);
+        Ok(Self {
+            key_faces: key_faces(&input, &surface)?,
+            input,
+            wall,
+            surface,
+            stress,
+        })
+    }
+
+    /// The patch with the largest share of the triangles that the user wants in the key.
+    pub fn key_of(&self, surface: &SegmentedSurface) -> Option<PatchId> {
+        let is_key = self.key_faces.as_ref()?;
+        let mut area_mm2: IdVec<PatchId, f64> = IdVec::from_fn(surface.n_patches, |_| 0.0);
+        for (face, &patch) in surface.patch_of_face.iter().enumerate() {
+            if is_key[surface.source_face[face] as usize] {
+                area_mm2[patch] += surface.mesh.face_area(face);
+            }
+        }
+        let largest = area_mm2.iter().max_by(|a, b| a.1.total_cmp(b.1));
+        largest.map(|(patch, _)| patch)
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.wall.settings
+    }
+
+    /// Stress of the uncut wall, by place in the model as it was given.
+    pub fn stress(&self) -> Option<&StressMap> {
+        self.stress.as_ref()
+    }
+}
+
+/// Triangles of the model that are to be in the key, as [`KeySource::Piece`] says.
+fn key_faces(input: &Input<'_>, surface: &SegmentedSurface) -> Result<Option<Vec<bool>>, DesignError> {
+    let KeySource::Piece(name) = input.params.key else {
+        return Ok(None);
+    };
+    let mut is_key = vec![false; input.model.mesh().triangles.len()];
+    if let Some(labels) = input.labels {
+        for (is_key, label) in is_key.iter_mut().zip(labels) {
+            *is_key = *label == name;
+        }
+    } else {
+        for (patch, &source) in surface.patch_of_face.iter().zip(&surface.source_face) {
+            is_key[source as usize] |= i64::from(patch.number()) == name;
+        }
+    }
+    match (is_key.contains(&true), input.labels) {
+        (true, _) => Ok(Some(is_key)),
+        (false, Some(_)) => Err(DesignError::NoLabelOfKey(name)),
+        (false, None) => Err(DesignError::NoPieceOfKey(name, surface.n_patches)),
+    }
+}
+
+/// Lessons of the plans and kits of one division.
+#[derive(Default)]
+pub(super) struct Learned {
+    pub constraints: PlanConstraints,
+    pub failure: Failure,
+    pub n_kits: usize,
+}
+
+impl Learned {
+    pub fn add(&mut self, lesson: &Lesson) {
+        self.failure.blamed.extend(lesson.blamed());
+        lesson.teach(&mut self.constraints);
+    }
+}
+
+/// Pieces of one key, and all that is known of them.
+pub(super) struct Setup<'a> {
+    pub candidate: Candidate<'a>,
+    pub division: Division,
+    pub grid: WallGrid,
+    pub survey: Option<PlanSurvey>,
+    pub learned: Learned,
+}
+
+/// Layers of a trial that kits are made from.
+pub(super) struct Parts<'t, 'a> {
+    pub job: &'t Job<'a>,
+    pub setup: &'t mut Setup<'a>,
+    /// Site of the key; `None` for a piece as it is.
+    pub site: Option<KeySite>,
+    pub effort: &'t mut Effort,
+}
+
+/// All layers of the present trial; those that could not be made are missing.
+pub(super) struct Trial<'a> {
+    input: Input<'a>,
+    /// The wall that a fall asks for, before the model is divided.
+    thinnest: Wall,
+    /// The thinnest wall that is made, once a way needs it.
+    thin: Option<Wall>,
+    job: Option<Job<'a>>,
+    /// The first division, if it is known.
+    divided: Option<SegmentedSurface>,
+    /// Sites for a key that is cut, best first.
+    sites: Vec<KeySite>,
+    setup: Option<Setup<'a>>,
+    pub effort: Effort,
+}
+
+impl<'a> Trial<'a> {
+    /// A trial of `input` with this wall; nothing is divided yet.
+    pub fn new(input: Input<'a>, thinnest: Wall) -> Self {
+        Self {
+            input,
+            thinnest,
+            thin: None,
+            job: None,
+            divided: None,
+            sites: Vec::new(),
+            setup: None,
+            effort: Effort::default(),
+        }
+    }
+
+    /// Takes the first division, where it is known.
+    pub fn take_division(&mut self, divided: Option<SegmentedSurface>) {
+        self.divided = divided;
+    }
+
+    /// Returns the model as it is divided, and all sites for a key that is cut.
+    pub fn into_division(self) -> (Option<Job<'a>>, Vec<KeySite>) {
+        (self.job, self.sites)
+    }
+
+    /// Site of the present key; `None` for a piece as it is.
+    pub fn site(&self, agenda: &Agenda) -> Option<KeySite> {
+        self.sites[..self.sites.len().min(CUT_KEYS)]
+            .get(agenda.key())
+            .copied()
+    }
+
+    /// Layers that kits are made from. The last change must have been possible.
+    pub fn parts(&mut self, agenda: &Agenda) -> Parts<'_, 'a> {
+        Parts {
+            site: self.site(agenda),
+            job: self.job.as_ref().expect("the model is divided"),
+            setup: self.setup.as_mut().expect("the key is cut"),
+            effort: &mut self.effort,
+        }
+    }
+
+    /// Divides the model in the present way and cuts the first key.
+    pub fn begin(&mut self, ctx: &Ctx, agenda: &mut Agenda) -> Result<Option<Failure>, DesignError> {
+        self.forget();
+        let wall = Arc::new(self.wall_of(ctx, agenda.way())?);
+        let job = match self.divided.take() {
+            Some(surface) => Job::of(self.input, wall, surface)?,
+            None => Job::new(ctx, self.input, wall)?,
+        };
+        self.use_job(ctx, agenda, job)
+    }
+
+    fn forget(&mut self) {
+        (self.job, self.setup) = (None, None);
+        self.sites.clear();
+    }
+
+    /// Makes a change. Returns a failure if nothing can be tried with it.
+    pub fn apply(
+        &mut self,
+        ctx: &Ctx,
+        agenda: &mut Agenda,
+        change: Change,
+    ) -> Result<Option<Failure>, DesignError> {
+        match change {
+            Change::Step(Step::NextWay) => self.begin(ctx, agenda),
+            Change::Step(Step::LowerLoad) => {
+                ctx.note("no kit with walls so thick passes: walls as thin as a fall allows");
+                self.begin(ctx, agenda)
+            }
+            Change::Step(Step::NextKey) => self.use_key(ctx, agenda),
+            Change::Step(_) => Ok(None),
+            Change::Enlarge(sizes) => {
+                ctx.note("seams would open where it is used: larger connectors there");
+                if let Some(setup) = &mut self.setup {
+                    setup.division.chosen = sizes;
+                    setup.begin_division();
+                }
+                Ok(None)
+            }
+            Change::Divide(step, surface, warning) => self.use_pieces(ctx, agenda, step, surface, warning),
+            Change::Thicken(thicker) => {
+                let job = self
+                    .job
+                    .take()
+                    .expect("a thicker wall is sought for a model that is divided");
+                ctx.note(&thicker.words());
+                self.forget();
+                let wall = job.wall.thicken(ctx, &self.input, thicker)?;
+                let job = Job::new(ctx, self.input, Arc::new(wall))?;
+                self.use_job(ctx, agenda, job)
+            }
+        }
+    }
+
+    fn wall_of(&mut self, ctx: &Ctx, way: Way) -> Result<Wall, DesignError> {
+        if way.walls != Walls::Thin {
+            return Ok(self.thinnest.divided(way));
+        }
+        if self.thin.is_none() {
+            self.thin = Some(self.thinnest.thin(ctx, &self.input)?);
+        }
+        Ok(self.thin.as_ref().unwrap_or(&self.thinnest).divided(way))
+    }
+
+    fn use_job(
+        &mut self,
+        ctx: &Ctx,
+        agenda: &mut Agenda,
+        job: Job<'a>,
+    ) -> Result<Option<Failure>, DesignError> {
+        self.sites = candidate::sites(ctx, &job)?;
+        self.job = Some(job);
+        agenda.set_keys(self.sites.len().min(CUT_KEYS) + 1);
+        self.use_key(ctx, agenda)
+    }
+
+    /// Takes the present place for the key, and the pieces as they are divided.
+    fn use_key(&mut self, ctx: &Ctx, agenda: &Agenda) -> Result<Option<Failure>, DesignError> {
+        self.setup = None;
+        let site = self.site(agenda);
+        if let Some(site) = &site {
+            ctx.note(&candidate::words(site));
+        }
+        let job = self
+            .job
+            .as_ref()
+            .expect("keys are sought in a model that is divided");
+        let Some(candidate) = Candidate::new(job, site.as_ref()) else {
+            return Ok(Some(Failure::default()));
+        };
+        self.effort.keys += 1;
+        let Some(division) = candidate.divide(ctx, job, candidate.surface.clone())? else {
+            return Ok(Some(Failure::of("the key falls apart")));
+        };
+        self.effort.segmentations += 1;
+        let mut setup = Setup {
+            candidate,
+            division,
+            grid: WallGrid::default(),
+            survey: None,
+            learned: Learned::default(),
+        };
+        setup.begin_division();
+        self.setup = Some(setup);
+        Ok(None)
+    }
+
+    /// Takes other pieces. If no key can be cut of joined pieces, keeps those that are, and joins no others for that reason.
+    fn use_pieces(
+        &mut self,
+        ctx: &Ctx,
+        agenda: &mut Agenda,
+        step: Step,
+        surface: SegmentedSurface,
+        warning: Option<Warning>,
+    ) -> Result<Option<Failure>, DesignError> {
+        let (job, setup) = (self.job.as_ref(), self.setup.as_mut());
+        let (job, setup) = job
+            .zip(setup)
+            .expect("pieces are changed of a model that is divided");
+        let Some(next) = setup.candidate.divide(ctx, job, surface)? else {
+            if matches!(step, Step::JoinPredicted | Step::JoinWeak) {
+                agenda.forgo(step);
+                setup.begin_division();
+                return Ok(None);
+            }
+            return Ok(Some(Failure::default()));
+        };
+        self.effort.segmentations += 1;
+        let (n, before) = (next.surface.n_patches, setup.division.surface.n_patches);
+        ctx.note(&match (&warning, step) {
+            (Some(warning), _) => format!("{warning}: {n} pieces"),
+            (None, Step::JoinPredicted) => {
+                format!("pieces would rattle: trying {n} pieces instead of {before}")
+            }
+            (None, _) => format!("trying other pieces: {n} instead of {before}"),
+        });
+        let mut changes = if warning.is_some() {
+            std::mem::take(&mut setup.division.changes)
+        } else {
+            Vec::new()
+        };
+        changes.extend(warning);
+        setup.division = Division { changes, ..next };
+        setup.begin_division();
+        Ok(None)
+    }
+}
+
+impl Setup<'_> {
+    /// Surveys the plans of the present pieces, unless that was done.
+    pub fn survey_plans(&mut self, ctx: &Ctx) -> Result<(), DesignError> {
+        if self.survey.is_none() {
+            let Division {
+                surface,
+                settings,
+                chosen,
+                ..
+            } = &self.division;
+            let (params, seams) = (&settings.plan, surface.seams());
+            self.survey = Some(plan::survey(&ctx.fork(), params, surface, &seams, &chosen.sizes)?);
+        }
+        Ok(())
+    }
+
+    /// Forgets what was learned and measured of other pieces, and makes sure that connectors will have room.
+    fn begin_division(&mut self) {
+        let Division { settings, chosen, .. } = &self.division;
+        (self.survey, self.learned) = (None, Learned::default());
+        self.grid
+            .begin_division(settings.connector.room_mm(chosen.sizes.largest_mm()));
+    }
+}
