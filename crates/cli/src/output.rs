@@ -15,7 +15,7 @@ use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
-use shellock_studio::name_in_kit;
+use shellock_studio::with_slashes;
 
 use crate::args::{Axis, Options};
 use crate::failure::Failure;
@@ -195,7 +195,7 @@ fn foreign_file(folder: &Path) -> Option<String> {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 left.push(path);
             } else {
-                names.push(name_in_kit(&path));
+                names.push(with_slashes(&path));
             }
         }
     }
