@@ -48,7 +48,7 @@ enum Step {
 
 impl Step {
     /// Steps of a check, the quickest first.
-    const ALL: [Self; 3] = [Self::Format, Self::Lints, Self::Tests];
+    const ALL: [Self; 4] = [Self::Format, Self::Words, Self::Lints, Self::Tests];
 
     fn name(self) -> &'static str {
         match self {
