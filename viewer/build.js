@@ -23,7 +23,7 @@ export async function bundle() {
   return result.outputFiles;
 }
 
-/** The studio's page: its files and their texts. */
+/** The studio's script and its text. The page and its style are written by hand, in crates/studio/page. */
 export async function studio() {
   const notices = await Promise.all(["three", "three-mesh-bvh"].map(async (name) => `${name}\n${(await readFile(path(`node_modules/${name}/LICENSE`), "utf8")).trim()}`));
   const result = await esbuild.build({
@@ -36,8 +36,7 @@ export async function studio() {
     target: "es2022",
     write: false,
   });
-  const beside = await Promise.all(["index.html", "studio.css"].map(async (name) => ({ path: path(`../crates/studio/page/${name}`), text: await readFile(path(`src/studio/${name}`), "utf8") })));
-  return [...result.outputFiles, ...beside];
+  return result.outputFiles;
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {

@@ -130,41 +130,7 @@ pub fn measure(
         .collect();
     let slide = slide(params, plan, &bearings, &centers);
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let solve = |bearings: &[Bearing], candidates, id: PatchId| {
-        let question = Problem {
-            surfaces: &surfaces,
-            bearings,
-            candidates,
-            centers: &centers,
-            slide: &slide,
-            free: &[id],
-            set_back_mm: 0.0,
-        };
-        question.solve(ctx)
-    };
-    let mut answers: Vec<Answer> = ids
-        .par_iter()
-        .map(|&id| solve(&bearings, Candidates::All, id))
-        .collect::<Result<_, Cancelled>>()?;
-    // If that is not enough, more points are sampled: the best of them are nearer to the ends of short
-    // connectors.
-    let again: Vec<PatchId> = ids
-        .iter()
-        .copied()
-        .filter(|&id| is_close(&answers[usize::from(id)]))
-        .collect();
-    let finer: Vec<(Vec<Bearing>, Answer)> = again
-        .par_iter()
-        .map(|&id| {
-            let finer = surfaces.finer(id, params.clearance_mm, params.seed);
-            let answer = solve(&finer, Candidates::All, id)?;
-            Ok((finer, answer))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    for (id, (finer, answer)) in again.into_iter().zip(finer) {
-        answers[usize::from(id)] = answer.after(bearings.len());
-        bearings.extend(finer);
-    }
+    let answers = solve_each(ctx, params, &surfaces, &mut bearings, &centers, &slide)?;
     let alone = answers.iter().map(alone).collect();
     let estimates = answers
         .iter()
@@ -202,6 +168,53 @@ pub fn measure(
         together,
         proofs,
     })
+}
+
+/// Solves for each piece while all others are held. Bearings sampled for it are appended to `bearings`.
+fn solve_each(
+    ctx: &Ctx,
+    params: &PlayParams,
+    surfaces: &Surfaces,
+    bearings: &mut Vec<Bearing>,
+    centers: &IdVec<PatchId, Vec3>,
+    slide: &Slide,
+) -> Result<Vec<Answer>, Cancelled> {
+    let solve = |bearings: &[Bearing], id: PatchId| {
+        let question = Problem {
+            surfaces,
+            bearings,
+            candidates: Candidates::All,
+            centers,
+            slide,
+            free: &[id],
+            set_back_mm: 0.0,
+        };
+        question.solve(ctx)
+    };
+    let ids: Vec<PatchId> = centers.ids().collect();
+    let mut answers: Vec<Answer> = ids
+        .par_iter()
+        .map(|&id| solve(bearings, id))
+        .collect::<Result<_, Cancelled>>()?;
+    // If that is not enough, more points are sampled: the best of them are nearer to the ends of short
+    // connectors.
+    let again: Vec<PatchId> = ids
+        .into_iter()
+        .filter(|&id| is_close(&answers[usize::from(id)]))
+        .collect();
+    let finer: Vec<(Vec<Bearing>, Answer)> = again
+        .par_iter()
+        .map(|&id| {
+            let finer = surfaces.finer(id, params.clearance_mm, params.seed);
+            let answer = solve(&finer, id)?;
+            Ok((finer, answer))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    for (id, (finer, answer)) in again.into_iter().zip(finer) {
+        answers[usize::from(id)] = answer.after(bearings.len());
+        bearings.extend(finer);
+    }
+    Ok(answers)
 }
 
 /// Searches for ways out of the `pieces` for which `play` has no proof; the key's way out is known. A

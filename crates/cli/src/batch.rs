@@ -15,6 +15,7 @@ use std::sync::{Condvar, Mutex, OnceLock};
 use std::time::Duration;
 
 use serde_json::json;
+use shellock_studio::with_slashes;
 
 use crate::Session;
 use crate::args::BatchOptions;
@@ -124,7 +125,7 @@ impl<'a> Shop<'a> {
                 None => self.run.record(self.session, &task.job),
                 Some(first) => self.run.again(self.session, &task.job, first),
             };
-            let model = task.job.model.display().to_string();
+            let model = with_slashes(&task.job.model);
             let record = self.queue.lock().expect("no worker panics").ended(task, record);
             self.has_room.notify_all();
             if self.session.stop.load(Ordering::Relaxed) {

@@ -47,6 +47,7 @@ use serde_json::json;
 
 use args::Command;
 use failure::Failure;
+pub use manual::options_guide;
 
 /// Programs in the guide, compiled and run with the tests.
 #[cfg(doctest)]

@@ -1,5 +1,7 @@
 //! Shell completions and manual pages, made from the declarations of the command line.
 
+mod guide;
+
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -7,6 +9,7 @@ use std::path::Path;
 use crate::args;
 use crate::failure::Failure;
 use crate::stages::write as write_file;
+pub use guide::options_guide;
 
 /// Runs `shellock completions` and returns the exit code.
 pub fn completions(shell: clap_complete::Shell) -> u8 {

@@ -15,7 +15,7 @@ use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
-use shellock_studio::name_in_kit;
+use shellock_studio::with_slashes;
 
 use crate::args::{Axis, Options};
 use crate::failure::Failure;
@@ -195,7 +195,7 @@ fn foreign_file(folder: &Path) -> Option<String> {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 left.push(path);
             } else {
-                names.push(name_in_kit(&path));
+                names.push(with_slashes(&path));
             }
         }
     }
@@ -229,25 +229,7 @@ pub fn files(
         .par_iter()
         .map(|m| thin_share(m, settings.connector.min_wall_mm).share)
         .collect();
-    let volume: f64 = design
-        .kit
-        .pieces
-        .as_slice()
-        .iter()
-        .map(TriMesh::signed_volume)
-        .sum();
-    let usable: f64 = design.kit.contacts.iter().map(|c| c.usable_mm).sum();
-    let made: f64 = design.kit.joints.iter().map(|j| j.length_mm).sum();
-    let summary = Summary {
-        volume_ratio: volume / model.solid.volume(),
-        grams: printing.grams(),
-        connector_share: if usable > 0.0 {
-            (made / usable).min(1.0)
-        } else {
-            0.0
-        },
-        thin_share: thin.iter().copied().fold(0.0, f64::max),
-    };
+    let summary = summary(model, design, printing, &thin);
     let plan = plan_file(model, settings, design, warnings, &summary, &thin, printing);
     let mut files = vec![(PLAN.to_owned(), plan.to_bytes())];
     let meshes = design
@@ -307,6 +289,23 @@ pub fn files(
     files.push(("pieces.png".into(), picture));
     files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
     (files, summary)
+}
+
+fn summary(model: &Model, design: &Design, printing: &Printing, thin: &[f64]) -> Summary {
+    let pieces = design.kit.pieces.as_slice();
+    let volume: f64 = pieces.iter().map(TriMesh::signed_volume).sum();
+    let usable: f64 = design.kit.contacts.iter().map(|c| c.usable_mm).sum();
+    let made: f64 = design.kit.joints.iter().map(|j| j.length_mm).sum();
+    Summary {
+        volume_ratio: volume / model.solid.volume(),
+        grams: printing.grams(),
+        connector_share: if usable > 0.0 {
+            (made / usable).min(1.0)
+        } else {
+            0.0
+        },
+        thin_share: thin.iter().copied().fold(0.0, f64::max),
+    }
 }
 
 fn plan_file(

@@ -74,8 +74,10 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
         {
             return Err(wrong(format!("\"{file}\" is no file within the folder")));
         }
-        if file.eq_ignore_ascii_case(CERTIFICATE) || told.pieces[..i].iter().any(|other| other.file == *file)
-        {
+        // As paths: "a//b.stl" and, on Windows, "a\\b.stl" are "a/b.stl".
+        let is_file = |other: &str| Path::new(other) == Path::new(file);
+        let is_taken = told.pieces[..i].iter().any(|other| is_file(&other.file));
+        if file.eq_ignore_ascii_case(CERTIFICATE) || is_taken {
             return Err(wrong(format!(
                 "\"{file}\" cannot be a piece: each piece has a file of its own"
             )));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use shellock::design::{Design, Kit, Settings};
-use shellock::verify::{Finding, Play};
+use shellock::verify::{Check, Finding, Play};
 use shellock::{Cause, IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -46,34 +46,8 @@ pub fn report(
         .chain(warnings.iter().cloned())
         .map(|w| w.turned(|at| stand(Vec3::from_array(at)).to_array()))
         .collect();
-    let plan = &design.kit.plan;
-    let pieces: Vec<ReportPiece> = design
-        .kit
-        .pieces
-        .ids()
-        .map(|p| ReportPiece {
-            number: p.number(),
-            name: format!("piece {p}"),
-            color: palette::color(p.into()),
-            mesh: &shown[usize::from(p)],
-            installation_direction: stand(-plan.separation(p).unit()).to_array(),
-            order: p.into(),
-            is_key: plan.key() == p,
-            facts: piece_facts(design, p),
-        })
-        .collect();
+    let pieces = pieces(design, &shown, stand);
     let facts = kit_facts(&shown, settings, design, summary, &standing);
-    let checks = design
-        .kit
-        .verification
-        .checks
-        .iter()
-        .map(|c| ReportCheck {
-            name: c.name.clone(),
-            ok: c.ok,
-            figure: c.figure.clone(),
-        })
-        .collect();
     let quantities = quantities(design);
     let looks = looks(&pieces);
     let has_passed = design.kit.verification.passed();
@@ -91,7 +65,7 @@ pub fn report(
         title: model.name.clone(),
         facts,
         pieces,
-        checks,
+        checks: checks(design),
         warnings: &warnings,
         figures,
         quantities,
@@ -125,7 +99,36 @@ pub fn report(
     (page, picture, booklet)
 }
 
+<<<<<<< HEAD
 /// Motions that the page can show: each piece within its play, and the ways out that were found.
+=======
+fn pieces<'a>(design: &Design, shown: &'a [TriMesh], stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportPiece<'a>> {
+    let plan = &design.kit.plan;
+    let piece = |p: PatchId| ReportPiece {
+        number: p.number(),
+        name: format!("piece {p}"),
+        color: palette::color(p.into()),
+        mesh: &shown[usize::from(p)],
+        installation_direction: stand(-plan.separation(p).unit()).to_array(),
+        order: p.into(),
+        is_key: plan.key() == p,
+        facts: piece_facts(design, p),
+    };
+    design.kit.pieces.ids().map(piece).collect()
+}
+
+fn checks(design: &Design) -> Vec<ReportCheck> {
+    let checks = design.kit.verification.checks.iter();
+    let check = |c: &Check| ReportCheck {
+        name: c.name.clone(),
+        ok: c.ok,
+        figure: c.figure.clone(),
+    };
+    checks.map(check).collect()
+}
+
+/// What the report can show moving: each piece within its play.
+>>>>>>> w4
 fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     let turned = |v: [f64; 3]| stand(Vec3::from(v)).to_array();
     let pose = |[x, y, z, u, v, w]: [f64; 6]| {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use serde_json::Value;
 use shellock_formats::write_stl_binary;
 use shellock_testkit::shapes::cuboid;
 
@@ -42,6 +43,7 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
+<<<<<<< HEAD
 /// Slow test (some 20 s): makes two whole kits.
 #[test]
 fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
@@ -61,26 +63,32 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     assert_eq!(code(&job("2", "two")), 0);
     let (a, b) = (content(&dir.path().join("one")), content(&dir.path().join("two")));
     for (x, y) in a.iter().zip(&b) {
+=======
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+fn assert_same_files(one: &Path, two: &Path) {
+    let (one, two) = (content(one), content(two));
+    for (x, y) in one.iter().zip(&two) {
+>>>>>>> w4
         assert_eq!(x.0, y.0);
         assert!(x.1 == y.1, "{} differs between one and two threads", x.0);
     }
-    assert_eq!(a.len(), b.len());
-    let plan: serde_json::Value =
-        serde_json::from_slice(&fs::read(dir.path().join("one/plan.json")).unwrap()).unwrap();
+    assert_eq!(one.len(), two.len());
+}
+
+fn assert_whole(kit: &Path, plan: &Value) {
     assert_eq!(
         plan["installation_order"].as_array().unwrap().last(),
         Some(&plan["key_piece"])
     );
     assert!(plan["key"]["rails"].as_f64().unwrap() > 5.0, "{}", plan["key"]);
-    for piece in plan["pieces"].as_array().unwrap() {
-        assert!(
-            dir.path()
-                .join("one")
-                .join(piece["file"].as_str().unwrap())
-                .is_file()
-        );
+    let pieces = plan["pieces"].as_array().unwrap();
+    for piece in pieces {
+        assert!(kit.join(piece["file"].as_str().unwrap()).is_file());
     }
-    let files = [
+    for name in [
         "assembly.3mf",
         "certificate.json",
         "report.html",
@@ -88,54 +96,53 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
         "segmentation.ply",
         "plates.3mf",
         "instructions.pdf",
-    ];
-    for name in files {
-        assert!(dir.path().join("one").join(name).is_file(), "{name}");
+    ] {
+        assert!(kit.join(name).is_file(), "{name}");
     }
-    assert_eq!(
-        fs::read_dir(dir.path()).unwrap().count(),
-        2,
-        "something was left behind"
-    );
-
     let laid = plan["printing"]["laid"].as_array().unwrap();
+    assert_eq!(laid.len(), pieces.len(), "every piece lies on a plate");
+}
+
+/// Slow (some 20 s): two whole jobs.
+#[test]
+fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| shellock(dir.path(), args);
+    let job = |threads: &str, out: &str| {
+        let job = "demo --figure vase --size 80 --pieces 6 --time 0 --json --threads";
+        run(&job.split(' ').chain([threads, "-o", out]).collect::<Vec<_>>())
+    };
+    let first = job("1", "one");
+    let verdict = json(&first.stdout);
     assert_eq!(
-        laid.len(),
-        plan["pieces"].as_array().unwrap().len(),
-        "every piece lies on a plate"
+        (code(&first), &verdict["status"]),
+        (0, &"verified".into()),
+        "{verdict:#}"
     );
+    assert_eq!(code(&job("2", "two")), 0);
+    let kit = dir.path().join("one");
+    assert_same_files(&kit, &dir.path().join("two"));
+    let plan = json(&fs::read(kit.join("plan.json")).unwrap());
+    assert_whole(&kit, &plan);
+    let n_folders = fs::read_dir(dir.path()).unwrap().count();
+    assert_eq!(n_folders, 2, "something was left behind");
 
     // The kit can be verified again from its files, and a missing piece is noticed.
     assert_eq!(
-        code(&shellock(
-            dir.path(),
-            &["figure", "vase", "--size", "80", "-o", "vase.stl"]
-        )),
+        code(&run(&["figure", "vase", "--size", "80", "-o", "vase.stl"])),
         0
     );
-    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 0);
-    let o = shellock(
-        dir.path(),
-        &["report", "one", "vase.stl", "--closed-form", "--json"],
-    );
-    let savings: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
-    let written = fs::read(dir.path().join("one/savings.json")).unwrap();
-    assert_eq!(
-        savings,
-        serde_json::from_slice::<serde_json::Value>(&written).unwrap()
-    );
+    assert_eq!(code(&run(&["verify", "one", "vase.stl"])), 0);
+    let savings = json(&run(&["report", "one", "vase.stl", "--closed-form", "--json"]).stdout);
+    assert_eq!(savings, json(&fs::read(kit.join("savings.json")).unwrap()));
     let ratio = savings["volume_ratio"].as_f64().unwrap();
     assert!(
         (ratio - plan["volume_ratio"].as_f64().unwrap()).abs() < 1e-5,
         "{savings:#}"
     );
     assert_eq!(savings["print_time"]["sla"]["by"], "closed form");
-    fs::copy(
-        dir.path().join("one/pieces/piece-02.stl"),
-        dir.path().join("one/pieces/piece-01.stl"),
-    )
-    .unwrap();
-    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 1);
+    fs::copy(kit.join("pieces/piece-02.stl"), kit.join("pieces/piece-01.stl")).unwrap();
+    assert_eq!(code(&run(&["verify", "one", "vase.stl"])), 1);
 }
 
 #[test]

@@ -157,41 +157,62 @@ fn odd_files() -> Vec<Twin> {
     ]
 }
 
+<<<<<<< HEAD
 /// Files that are broken or odd in their surface.
 fn odd_surfaces() -> Vec<Twin> {
+=======
+/// The ball with corners of its own for each triangle.
+fn loose_triangles() -> TriMesh {
+>>>>>>> w4
     let good = ball(Vec3::ZERO);
-    let unwelded = TriMesh {
+    TriMesh {
         points: (0..good.triangles.len()).flat_map(|f| good.corners(f)).collect(),
         triangles: (0..good.triangles.len() as u32)
             .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
             .collect(),
-    };
-    let mut cracked = unwelded.clone();
-    cracked
-        .points
-        .iter_mut()
-        .enumerate()
-        .for_each(|(i, p)| p.x += 1e-5 * (i % 7) as f64);
-    let divided = changed(|m| {
+    }
+}
+
+/// The unwelded ball with narrow cracks between its triangles.
+fn narrow_cracks() -> TriMesh {
+    let mut mesh = loose_triangles();
+    for (i, p) in mesh.points.iter_mut().enumerate() {
+        p.x += 1e-5 * (i % 7) as f64;
+    }
+    mesh
+}
+
+/// The ball with a triangle divided at an edge that its neighbour keeps.
+fn split_edge() -> TriMesh {
+    changed(|m| {
         let [a, b, c] = m.triangles[0];
         m.points.push(0.5 * (m.points[a as usize] + m.points[b as usize]));
         let middle = m.points.len() as u32 - 1;
         m.triangles[0] = [a, middle, c];
         m.triangles.push([middle, b, c]);
-    });
+    })
+}
+
+/// Some triangles of the ball, without their neighbours.
+fn soup() -> TriMesh {
+    let mut mesh = loose_triangles();
+    mesh.triangles = mesh.triangles.into_iter().step_by(9).collect();
+    mesh
+}
+
+fn turn_inside_out(mut mesh: TriMesh) -> TriMesh {
+    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    mesh
+}
+
+/// Broken or odd as surfaces.
+fn odd_surfaces() -> Vec<Twin> {
+    let good = ball(Vec3::ZERO);
     let inner = scaled(&good, 0.3, Vec3::ONE);
-    let everted = |mut mesh: TriMesh| {
-        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-        mesh
-    };
-    let soup = TriMesh {
-        triangles: unwelded.triangles.iter().step_by(9).copied().collect(),
-        ..unwelded.clone()
-    };
     let speck = scaled(&good, 0.001, Vec3::splat(29.0));
     vec![
-        ("unwelded.ply", ply(&unwelded), Sound),
-        ("cracks.ply", ply(&cracked), Repaired(&["points-merged"])),
+        ("unwelded.ply", ply(&loose_triangles()), Sound),
+        ("cracks.ply", ply(&narrow_cracks()), Repaired(&["points-merged"])),
         (
             "copies.ply",
             ply(&changed(|m| m.triangles.extend_from_within(..50))),
@@ -206,7 +227,7 @@ fn odd_surfaces() -> Vec<Twin> {
         ),
         (
             "everted.ply",
-            ply(&everted(good.clone())),
+            ply(&turn_inside_out(good.clone())),
             Repaired(&["body-turned"]),
         ),
         (
@@ -219,10 +240,10 @@ fn odd_surfaces() -> Vec<Twin> {
             ply(&changed(|m| m.triangles.truncate(300))),
             Refused(&["not closed", "1 hole", "near ("]),
         ),
-        ("edge.ply", ply(&divided), Repaired(&["edges-joined"])),
+        ("edge.ply", ply(&split_edge()), Repaired(&["edges-joined"])),
         (
             "cavity.ply",
-            ply(&both(good.clone(), everted(inner.clone()))),
+            ply(&both(good.clone(), turn_inside_out(inner.clone()))),
             Repaired(&["cavities-filled"]),
         ),
         (
@@ -245,7 +266,7 @@ fn odd_surfaces() -> Vec<Twin> {
             ply(&both(good.clone(), ball(Vec3::X * 90.0))),
             Refused(&["2 separate bodies", "--largest"]),
         ),
-        ("soup.ply", ply(&soup), Refused(&["do not hang together"])),
+        ("soup.ply", ply(&soup()), Refused(&["do not hang together"])),
         (
             "thin.ply",
             ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))),

@@ -106,3 +106,21 @@ fn what_is_wrong_with_an_assembly_is_said_with_its_name() {
         assert!(said.contains(words), "{said}");
     }
 }
+
+#[test]
+fn a_file_that_is_named_in_two_ways_is_one_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let parts = dir.path().join("parts");
+    fs::create_dir(&parts).unwrap();
+    write_pieces(&parts, 1.0);
+    let place = |text: &str, name: &str, path: &str| text.replace(&format!("\"{name}"), &format!("\"{path}"));
+    let pieces = |rail: &str| {
+        let text = place(ASSEMBLY, "pin.stl", "parts/pin.stl");
+        place(&place(&text, "slider.stl", "parts/slider.stl"), "rail.stl", rail)
+    };
+    let ends = |rail: &str| verify(dir.path(), &pieces(rail)).status.code();
+    assert_eq!(ends("parts/rail.stl"), Some(0));
+    for same in ["parts/pin.stl", "parts//pin.stl", "parts/./pin.stl"] {
+        assert_eq!(ends(same), Some(2), "{same}");
+    }
+}

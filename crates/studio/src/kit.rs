@@ -9,8 +9,8 @@ use zip::write::SimpleFileOptions;
 
 use crate::Refusal;
 
-/// Name of the file at `path` within a kit: the parts of `path`, with `/` between them on every system.
-pub fn name_in_kit(path: &Path) -> String {
+/// Parts of a relative `path` with `/` between them on every system, as files and addresses name it.
+pub fn with_slashes(path: &Path) -> String {
     let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
     parts.join("/")
 }
@@ -24,7 +24,7 @@ pub fn names(folder: &Path) -> Vec<String> {
             let name = within.join(entry.file_name());
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() => left.push(name),
-                Ok(kind) if kind.is_file() => names.push(name_in_kit(&name)),
+                Ok(kind) if kind.is_file() => names.push(with_slashes(&name)),
                 // Symbolic links may lead out of the kit.
                 _ => {}
             }
@@ -133,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn a_name_in_a_kit_has_slashes_between_its_parts_on_every_system() {
+    fn a_name_has_slashes_between_its_parts_on_every_system() {
         for parts in [
             &["plan.json"][..],
             &["pieces", "piece-1.stl"],
             &["a", "b c", "ü.3mf"],
         ] {
             let path: PathBuf = parts.iter().collect();
-            assert_eq!(name_in_kit(&path), parts.join("/"));
+            assert_eq!(with_slashes(&path), parts.join("/"));
         }
     }
 

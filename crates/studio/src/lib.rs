@@ -27,7 +27,7 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 use tokio::net::TcpListener;
 
-pub use kit::name_in_kit;
+pub use kit::with_slashes;
 pub use refusal::Refusal;
 
 /// Largest accepted model file, bytes.

@@ -1,4 +1,4 @@
-//! Files of the page, as built from `viewer/`.
+//! Files of the page; its script is built from `viewer/`.
 
 use axum::extract::Path;
 use axum::http::header;

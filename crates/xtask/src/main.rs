@@ -1,66 +1,94 @@
-//! Tools for working on Shellock that are not part of it: studies of its metrics and searches as charts and
-//! tables, goldens, and the pictures of its documentation.
+//! Tasks of those who work on Shellock: the checks before a commit, and the way to what takes long to build.
 //!
-//! `cargo xtask --help` lists them.
+//! This program has few dependencies, so that the checks start soon. Studies, goldens, pictures and the guide
+//! of options need the product's crates; the program `studies` has them and is built when they are asked for.
+//! `cargo xtask --help` lists all.
 
-mod chart;
-mod convergence;
-mod effort;
-mod failure;
-mod golden;
-mod hard;
-mod hours;
-mod loads;
-mod metrics;
-mod model;
-mod pictures;
-mod savings;
-mod search;
-mod segmentations;
-mod statistics;
-mod strength;
-mod study;
-mod table;
-mod worse;
+mod check;
+mod problem;
+mod words;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::process::{Command, ExitCode};
 
 use clap::{Parser, Subcommand};
 
+/// Tasks of `studies`, each with its line in the help.
+const STUDIES: [(&str, &str); 5] = [
+    (
+        "study",
+        "Compare metrics or searches; writes charts (SVG) and tables",
+    ),
+    ("savings", "Make the table of what kits save over solid models"),
+    ("golden", "Compare kits with recorded digests, or record them"),
+    ("pictures", "Make the pictures of the documentation"),
+    ("options", "Write the guide of all options, docs/guide/options.md"),
+];
+
 #[derive(Parser)]
-#[command(name = "cargo xtask", about = "Tools for working on Shellock")]
+#[command(name = "cargo xtask", about = "Tasks of those who work on Shellock", after_help = studies())]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
 }
 
+/// List of the tasks of `studies` for the help.
+fn studies() -> String {
+    let lines = STUDIES.map(|(name, help)| format!("\n  {name:<10}{help}"));
+    format!("Built when they are first asked for:{}", lines.concat())
+}
+
 #[derive(Subcommand)]
 enum Task {
-    /// Compare metrics or searches; writes charts (SVG) and tables (CSV, Markdown)
-    Study(study::Options),
-    /// Make the table of what kits save over solid models, from what `shellock report` left in their folders
-    Savings(savings::Options),
-    /// Compare what the program writes and says with what it wrote and said before, byte by byte
-    Golden(golden::Options),
-    /// Make the pictures of the documentation from a kit of the program's own
-    Pictures(pictures::Options),
+    /// Check format, lints and fast tests; stops at the first failure
+    Check(check::Options),
+    /// Check comments and line widths of all sources
+    Words(words::Options),
+    #[command(external_subcommand)]
+    Study(Vec<OsString>),
 }
 
 fn main() -> ExitCode {
-    let made = match Arguments::parse().task {
-        Task::Study(options) => study::run(&options),
-        Task::Savings(options) => savings::run(&options),
-        Task::Golden(options) => golden::run(&options),
-        Task::Pictures(options) => pictures::run(&options),
+    let ended = match Arguments::parse().task {
+        Task::Check(options) => check::run(&options),
+        Task::Words(options) => words::run(&options),
+        Task::Study(arguments) => return study(&arguments),
     };
-    match made {
-        Ok(files) => {
-            files.iter().for_each(|f| println!("{}", f.display()));
-            ExitCode::SUCCESS
-        }
-        Err(failure) => {
-            eprintln!("error: {failure}");
+    match ended {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("error: {problem}");
             ExitCode::FAILURE
         }
     }
+}
+
+/// Builds and runs `studies` with `arguments`, of which the first is the task.
+fn study(arguments: &[OsString]) -> ExitCode {
+    let is_task = |name: &OsString| STUDIES.iter().any(|(task, _)| name == task);
+    if !arguments.first().is_some_and(is_task) {
+        eprintln!("error: there is no such task; `cargo xtask --help` lists all");
+        return ExitCode::from(2);
+    }
+    let status = Command::new(cargo())
+        .args(["run", "--release", "--package", "studies", "--"])
+        .args(arguments)
+        .status();
+    match status {
+        Ok(status) => ExitCode::from(
+            status
+                .code()
+                .and_then(|code| u8::try_from(code).ok())
+                .unwrap_or(1),
+        ),
+        Err(problem) => {
+            eprintln!("error: cargo cannot be run: {problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Path of the cargo that runs this program.
+fn cargo() -> OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }

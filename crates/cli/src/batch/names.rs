@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use shellock_studio::with_slashes;
+
 use crate::failure::Failure;
 use crate::input::sha256;
 use crate::output::PLAN;
@@ -69,13 +71,13 @@ fn is_kit(folder: &Path) -> bool {
 /// other kits.
 fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
     let lower = |name: &str| name.to_lowercase();
-    let stem = |model: &Path| model.with_extension("").to_string_lossy().into_owned();
+    let stem = |model: &Path| with_slashes(&model.with_extension(""));
     let mut stems: BTreeMap<String, usize> = BTreeMap::new();
     let mut taken: BTreeSet<String> = TAKEN.iter().map(|name| lower(name)).collect();
     for model in &models {
         *stems.entry(lower(&stem(model))).or_default() += 1;
         let folders = model.ancestors().skip(1);
-        taken.extend(folders.map(|folder| lower(&folder.to_string_lossy())));
+        taken.extend(folders.map(|folder| lower(&with_slashes(folder))));
     }
     let is_alone = |name: &str| stems.get(&lower(name)).is_none_or(|n| *n == 1);
     let mut kits: BTreeMap<&PathBuf, String> = BTreeMap::new();
@@ -93,7 +95,7 @@ fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .replace('.', "-");
-            let full = model.with_file_name(file).to_string_lossy().into_owned();
+            let full = with_slashes(&model.with_file_name(file));
             let numbered = (2..).map(|n| format!("{full}-{n}"));
             let mut free = std::iter::once(full.clone()).chain(numbered);
             let name = free
@@ -141,7 +143,7 @@ mod tests {
         let found = models(dir.path(), Some(&dir.path().join("out"))).unwrap();
         let found: Vec<(String, String)> = found
             .into_iter()
-            .map(|(model, kit)| (model.display().to_string(), kit.display().to_string()))
+            .map(|(model, kit)| (with_slashes(&model), kit.display().to_string()))
             .collect();
         let records: BTreeSet<PathBuf> = found
             .iter()
@@ -208,6 +210,19 @@ mod tests {
                 .count(),
             0
         );
+    }
+
+    #[test]
+    fn the_name_of_a_kit_has_slashes_between_its_parts_on_every_system() {
+        for file in ["a.stl", "a.obj"] {
+            let models = ["a.stl", file].map(|file| ["b", "c", file].iter().collect());
+            let kits = named(BTreeSet::from(models));
+            assert!(
+                kits.iter()
+                    .all(|(_, kit)| kit.to_str().unwrap().starts_with("b/c/a")),
+                "{kits:?}"
+            );
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use shellock_studio::with_slashes;
 
 use super::run::Job;
 use crate::failure::{Failure, TIME_UP};
@@ -120,7 +121,7 @@ pub fn kit_is(folder: &Path) -> Option<String> {
             } else {
                 told.push(format!(
                     "{} {}",
-                    path.strip_prefix(folder).ok()?.display(),
+                    with_slashes(path.strip_prefix(folder).ok()?),
                     data.len()
                 ));
             }
@@ -136,8 +137,8 @@ impl Record {
     pub fn blank(job: &Job, made_of: String) -> Self {
         Self {
             made_of,
-            model: job.model.to_string_lossy().into_owned(),
-            kit: job.kit.to_string_lossy().into_owned(),
+            model: with_slashes(&job.model),
+            kit: with_slashes(&job.kit),
             status: Status::Refused,
             seconds: 0.0,
             peak_mb: None,

@@ -278,8 +278,7 @@ impl Bench {
 
     /// Words a failure for the page, without the path of the project's folder.
     fn refused(&self, failure: &Failure) -> Refusal {
-        let folder = format!("{}/", self.store.folder().display());
-        let words = failure.to_string().replace(&folder, "");
+        let words = without_folder(&failure.to_string(), self.store.folder());
         match failure {
             Failure::Unwritable { .. } => Refusal::unable(words),
             _ => Refusal::wrong(words),
@@ -541,6 +540,11 @@ impl Workshop for Bench {
             let _ = self.store.note_kit(&made_of, code, &result);
         }
     }
+}
+
+/// `words` without the path of `folder` before the names of files in it, which ends in this system's separator.
+fn without_folder(words: &str, folder: &Path) -> String {
+    words.replace(&folder.join("").display().to_string(), "")
 }
 
 fn painted_by_hand(labels: Vec<u32>) -> Pieces {

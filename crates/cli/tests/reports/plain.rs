@@ -113,44 +113,44 @@ fn point_coloured_off() -> String {
     text
 }
 
-/// All cases of plain formats.
-pub fn cases() -> Vec<Case> {
-    let as_floats = |p: Vec3| {
-        let [r, g, b] = color(p).map(|c| f64::from(c) / 255.0);
-        format!(" {r} {g} {b}")
-    };
-    let two = format!("o left\n{}", obj(&body(), |_| String::new()));
-    let right = obj(&moved(&body(), Vec3::X * 90.0), |_| String::new());
+/// Two bodies beside each other, "left" and "right".
+fn left_and_right() -> String {
     let n = body().points.len();
+    let later = |corners: &str| {
+        let corners = corners
+            .split(' ')
+            .map(|v| v.parse::<usize>().expect("a number") + n);
+        corners.map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
+    };
+    let right = obj(&moved(&body(), Vec3::X * 90.0), |_| String::new());
     let right: String = right
         .lines()
         .map(|line| match line.strip_prefix("f ") {
-            Some(corners) => {
-                let later = corners
-                    .split(' ')
-                    .map(|v| v.parse::<usize>().expect("a number") + n);
-                format!(
-                    "f {}\n",
-                    later.map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
-                )
-            }
+            Some(corners) => format!("f {}\n", later(corners)),
             None => format!("{line}\n"),
         })
         .collect();
-    let two = format!("{two}o right\n{right}");
-    let stray = obj(&body(), |_| String::new()) + "v 3000 0 0\n";
+    format!("o left\n{}o right\n{right}", obj(&body(), |_| String::new()))
+}
+
+/// The body with a stray point and one label a side.
+fn labelled_ply() -> Vec<u8> {
     let mut labelled = body();
     labelled.points.push(Vec3::splat(9000.0));
     let labels: Vec<i32> = (0..labelled.triangles.len())
         .map(|f| i32::from(labelled.face_center(f).x > 0.0))
         .collect();
+    write_ply(&labelled, Some(&labels))
+}
+
+fn of_obj() -> Vec<Case> {
+    let as_floats = |p: Vec3| {
+        let [r, g, b] = color(p).map(|c| f64::from(c) / 255.0);
+        format!(" {r} {g} {b}")
+    };
+    let plain = obj(&body(), |_| String::new());
+    let two = left_and_right();
     vec![
-        Case::new("colours.ply", coloured_ply())
-            .says(&[WHOLE, Labels("colors"), Note("--labels-from colors")])
-            .proves("PLY", "read", "colours of points"),
-        Case::new("labels.ply", write_ply(&labelled, Some(&labels)))
-            .says(&[WHOLE, Labels("labels")])
-            .proves("PLY", "read", "labels of faces"),
         Case::new("colours.obj", obj(&body(), as_floats).into_bytes())
             .says(&[WHOLE, Labels("colors")])
             .proves("OBJ", "read", "colours of points"),
@@ -159,12 +159,12 @@ pub fn cases() -> Vec<Case> {
             .with(&["--object", "right"])
             .says(&[WHOLE])
             .proves("OBJ", "read", "one object of several"),
-        Case::new("stray_point.obj", stray.into_bytes())
+        Case::new("stray_point.obj", (plain.clone() + "v 3000 0 0\n").into_bytes())
             .says(&[WHOLE])
             .proves("OBJ", "left out", "points that no face uses"),
         Case::new(
             "unknown_statement.obj",
-            (obj(&body(), |_| String::new()) + "surf 0 1 0 1 1 2 3 4\n").into_bytes(),
+            (plain + "surf 0 1 0 1 1 2 3 4\n").into_bytes(),
         )
         .says(&[WHOLE, Note("\"surf\"")])
         .proves("OBJ", "left out", "statements that are not known"),
@@ -177,37 +177,46 @@ pub fn cases() -> Vec<Case> {
         Case::new("notch.obj", notch().into_bytes())
             .says(&[Size([30.0, 30.0, 20.0])])
             .proves("all", "read", "polygons with notches"),
-        Case::new(
-            "one_after_the_other.stl",
-            [body(), moved(&body(), Vec3::X * 90.0)]
-                .map(|m| write_stl_binary(&m))
-                .concat(),
-        )
-        .says(&[Note("2 STL files"), Refused("2 separate bodies")])
-        .proves("STL", "read", "several binary files one after the other"),
-        Case::new(
-            "text_after.stl",
-            [
-                write_stl_binary(&body()),
-                b"solid x\n facet normal 0 0 0\n".repeat(3),
-            ]
-            .concat(),
-        )
-        .says(&[Refused("a text after the triangles")])
-        .proves("STL", "refused", "text after the triangles of a binary file"),
+    ]
+}
+
+fn of_stl() -> Vec<Case> {
+    let binary = write_stl_binary(&body());
+    let beside = write_stl_binary(&moved(&body(), Vec3::X * 90.0));
+    let text = b"solid x\n facet normal 0 0 0\n".repeat(3);
+    vec![
+        Case::new("one_after_the_other.stl", [binary.clone(), beside].concat())
+            .says(&[Note("2 STL files"), Refused("2 separate bodies")])
+            .proves("STL", "read", "several binary files one after the other"),
+        Case::new("text_after.stl", [binary.clone(), text].concat())
+            .says(&[Refused("a text after the triangles")])
+            .proves("STL", "refused", "text after the triangles of a binary file"),
+        Case::new("plain.stl", binary)
+            .says(&[WHOLE])
+            .proves("STL", "read", "binary and text"),
+    ]
+}
+
+fn of_ply_and_off() -> Vec<Case> {
+    vec![
+        Case::new("colours.ply", coloured_ply())
+            .says(&[WHOLE, Labels("colors"), Note("--labels-from colors")])
+            .proves("PLY", "read", "colours of points"),
+        Case::new("labels.ply", labelled_ply())
+            .says(&[WHOLE, Labels("labels")])
+            .proves("PLY", "read", "labels of faces"),
         Case::new("colours_of_points.off", point_coloured_off().into_bytes())
             .says(&[WHOLE, Labels("colors")])
             .proves("OFF", "read", "colours of points"),
         Case::new("colours.off", off(&body()).into_bytes())
             .says(&[WHOLE, Labels("colors")])
             .proves("OFF", "read", "colours of faces"),
-        Case::new("plain.stl", write_stl_binary(&body()))
-            .says(&[WHOLE])
-            .proves("STL", "read", "binary and text"),
     ]
-    .into_iter()
-    .chain(decisions())
-    .collect()
+}
+
+/// All cases of plain formats.
+pub fn cases() -> Vec<Case> {
+    [of_obj(), of_stl(), of_ply_and_off(), decisions()].concat()
 }
 
 fn stl(volume: &Volume) -> Vec<u8> {

@@ -98,105 +98,72 @@ impl RepairKind {
     }
 }
 
+impl RepairKind {
+    /// Subject of the sentence that reports `n` of these repairs.
+    fn subject(self, n: usize) -> String {
+        let (one, many) = match self {
+            Self::Merged { .. } => ("point was", "points were"),
+            Self::Copies => ("triangle was", "triangles were"),
+            Self::Joined => ("corner was", "corners were"),
+            Self::Turned => ("triangle faced", "triangles faced"),
+            Self::Closed { .. } => ("small hole was", "small holes were"),
+            Self::Everted => ("body was", "bodies were"),
+            Self::CutOut { .. } => ("body that was", "bodies that were"),
+            Self::InnerWalls => ("triangle belonged", "triangles belonged"),
+            Self::Specks { .. } => ("speck was", "specks were"),
+            Self::United { .. } => ("pair of triangles", "pairs of triangles"),
+            Self::Fused => ("bodies", "bodies"),
+            Self::Parted => ("point", "points"),
+            Self::Filled { .. } => ("closed surface", "closed surfaces"),
+            Self::Drained { .. } => ("opening was", "openings were"),
+            Self::LeftOut => ("smaller body was", "smaller bodies were"),
+        };
+        plural(n, one, many)
+    }
+
+    /// Sentence that reports repairs with this `subject`.
+    fn sentence(self, subject: &str) -> String {
+        match self {
+            Self::Merged { within } => {
+                let within = Short(within);
+                format!("{subject} merged with others within {within} across cracks")
+            }
+            Self::Copies => format!("{subject} there twice and removed"),
+            Self::Joined => format!("{subject} in the middle of a neighbour's edge and joined to it"),
+            Self::Turned => format!("{subject} the wrong way and turned"),
+            Self::Closed { widest } => format!("{subject} closed, up to {} wide", Short(widest)),
+            Self::Everted => format!("{subject} inside out and turned"),
+            Self::CutOut { volume } => {
+                let volume = Short(volume);
+                format!("{subject} inside out left a hole of {volume} in what it overlapped")
+            }
+            Self::InnerWalls => format!("{subject} to walls inside the body and removed"),
+            Self::Specks { longest } => format!("{subject} left out, up to {} long", Short(longest)),
+            Self::United { before, after } => {
+                let (before, after) = (Short(before), Short(after));
+                format!(
+                    "the surface crossed itself in {subject}; overlapping parts were united, \
+                     and the enclosed volume went from {before} to {after}"
+                )
+            }
+            Self::Fused => format!("{subject}, some of which touch with their faces, were united"),
+            Self::Parted => format!("the surface touched itself in {subject}; it was parted there"),
+            Self::Filled { volume } => {
+                let volume = Short(volume);
+                format!("{subject} inside the body, {volume} in volume, left out: pieces are hollow anyway")
+            }
+            Self::Drained { volume } => {
+                let volume = Short(volume);
+                format!("{subject} closed, and the cavity behind filled, {volume} in volume")
+            }
+            Self::LeftOut => format!("{subject} left out"),
+        }
+    }
+}
+
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let n = self.count;
-        match self.kind {
-            RepairKind::Merged { within } => {
-                let points = plural(n, "point was", "points were");
-                write!(
-                    f,
-                    "{points} merged with others within {} across cracks",
-                    Short(within)
-                )?;
-            }
-            RepairKind::Copies => {
-                write!(
-                    f,
-                    "{} there twice and removed",
-                    plural(n, "triangle was", "triangles were")
-                )?;
-            }
-            RepairKind::Joined => {
-                write!(
-                    f,
-                    "{} in the middle of a neighbour's edge and joined to it",
-                    plural(n, "corner was", "corners were")
-                )?;
-            }
-            RepairKind::Turned => {
-                write!(
-                    f,
-                    "{} the wrong way and turned",
-                    plural(n, "triangle faced", "triangles faced")
-                )?;
-            }
-            RepairKind::Closed { widest } => {
-                let holes = plural(n, "small hole was", "small holes were");
-                write!(f, "{holes} closed, up to {} wide", Short(widest))?;
-            }
-            RepairKind::Everted => write!(
-                f,
-                "{} inside out and turned",
-                plural(n, "body was", "bodies were")
-            )?,
-            RepairKind::CutOut { volume } => {
-                let bodies = plural(n, "body that was", "bodies that were");
-                let volume = Short(volume);
-                write!(
-                    f,
-                    "{bodies} inside out left a hole of {volume} in what it overlapped"
-                )?;
-            }
-            RepairKind::InnerWalls => write!(
-                f,
-                "{} to walls inside the body and removed",
-                plural(n, "triangle belonged", "triangles belonged")
-            )?,
-            RepairKind::Specks { longest } => {
-                let specks = plural(n, "speck was", "specks were");
-                write!(f, "{specks} left out, up to {} long", Short(longest))?;
-            }
-            RepairKind::United { before, after } => {
-                let pairs = plural(n, "pair of triangles", "pairs of triangles");
-                write!(
-                    f,
-                    "the surface crossed itself in {pairs}; overlapping parts were united, "
-                )?;
-                write!(
-                    f,
-                    "and the enclosed volume went from {} to {}",
-                    Short(before),
-                    Short(after)
-                )?;
-            }
-            RepairKind::Fused => write!(f, "{n} bodies, some of which touch with their faces, were united")?,
-            RepairKind::Parted => {
-                let points = plural(n, "point", "points");
-                write!(f, "the surface touched itself in {points}; it was parted there")?;
-            }
-            RepairKind::Filled { volume } => {
-                let cavities = plural(n, "closed surface", "closed surfaces");
-                let volume = Short(volume);
-                write!(
-                    f,
-                    "{cavities} inside the body, {volume} in volume, left out: pieces are hollow anyway"
-                )?;
-            }
-            RepairKind::Drained { volume } => {
-                let openings = plural(n, "opening was", "openings were");
-                let volume = Short(volume);
-                write!(
-                    f,
-                    "{openings} closed, and the cavity behind filled, {volume} in volume"
-                )?;
-            }
-            RepairKind::LeftOut => write!(
-                f,
-                "{} left out",
-                plural(n, "smaller body was", "smaller bodies were")
-            )?,
-        }
-        write!(f, "; first near {}", Coordinates(self.at))
+        let sentence = self.kind.sentence(&self.kind.subject(self.count));
+        write!(f, "{sentence}; first near {}", Coordinates(self.at))
     }
 }

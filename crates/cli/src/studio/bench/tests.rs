@@ -56,3 +56,13 @@ fn the_successor_of_a_label_has_most_of_its_area() {
     let of = |label| successor(label, &before, &after, |face| areas[face]);
     assert_eq!((of(7), of(8), of(9)), (Some(2), Some(1), None));
 }
+
+#[test]
+fn messages_for_the_page_name_files_without_their_folder() {
+    let folder: PathBuf = ["some", "project"].iter().collect();
+    let failure = Failure::Wrong(format!("{}: not closed", folder.join("ring.ply").display()));
+    assert_eq!(
+        without_folder(&failure.to_string(), &folder),
+        "ring.ply: not closed"
+    );
+}
