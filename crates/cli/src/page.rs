@@ -99,9 +99,6 @@ pub fn report(
     (page, picture, booklet)
 }
 
-<<<<<<< HEAD
-/// Motions that the page can show: each piece within its play, and the ways out that were found.
-=======
 fn pieces<'a>(design: &Design, shown: &'a [TriMesh], stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportPiece<'a>> {
     let plan = &design.kit.plan;
     let piece = |p: PatchId| ReportPiece {
@@ -127,8 +124,7 @@ fn checks(design: &Design) -> Vec<ReportCheck> {
     checks.map(check).collect()
 }
 
-/// What the report can show moving: each piece within its play.
->>>>>>> w4
+/// Motions that the page can show: each piece within its play, and the ways out that were found.
 fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     let turned = |v: [f64; 3]| stand(Vec3::from(v)).to_array();
     let pose = |[x, y, z, u, v, w]: [f64; 6]| {

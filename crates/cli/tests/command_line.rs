@@ -43,27 +43,6 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-<<<<<<< HEAD
-/// Slow test (some 20 s): makes two whole kits.
-#[test]
-fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
-    let dir = tempfile::tempdir().unwrap();
-    let job = |threads: &str, out: &str| {
-        let job = "demo --figure vase --size 80 --pieces 6 --time 0 --json --threads";
-        let args: Vec<&str> = job.split(' ').chain([threads, "-o", out]).collect();
-        shellock(dir.path(), &args)
-    };
-    let one = job("1", "one");
-    let verdict: serde_json::Value = serde_json::from_slice(&one.stdout).unwrap();
-    assert_eq!(
-        (code(&one), &verdict["status"]),
-        (0, &"verified".into()),
-        "{verdict:#}"
-    );
-    assert_eq!(code(&job("2", "two")), 0);
-    let (a, b) = (content(&dir.path().join("one")), content(&dir.path().join("two")));
-    for (x, y) in a.iter().zip(&b) {
-=======
 fn json(bytes: &[u8]) -> Value {
     serde_json::from_slice(bytes).unwrap()
 }
@@ -71,7 +50,6 @@ fn json(bytes: &[u8]) -> Value {
 fn assert_same_files(one: &Path, two: &Path) {
     let (one, two) = (content(one), content(two));
     for (x, y) in one.iter().zip(&two) {
->>>>>>> w4
         assert_eq!(x.0, y.0);
         assert!(x.1 == y.1, "{} differs between one and two threads", x.0);
     }
@@ -103,7 +81,7 @@ fn assert_whole(kit: &Path, plan: &Value) {
     assert_eq!(laid.len(), pieces.len(), "every piece lies on a plate");
 }
 
-/// Slow (some 20 s): two whole jobs.
+/// Slow test (some 20 s): makes two whole kits.
 #[test]
 fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();

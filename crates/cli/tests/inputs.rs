@@ -157,13 +157,8 @@ fn odd_files() -> Vec<Twin> {
     ]
 }
 
-<<<<<<< HEAD
-/// Files that are broken or odd in their surface.
-fn odd_surfaces() -> Vec<Twin> {
-=======
 /// The ball with corners of its own for each triangle.
 fn loose_triangles() -> TriMesh {
->>>>>>> w4
     let good = ball(Vec3::ZERO);
     TriMesh {
         points: (0..good.triangles.len()).flat_map(|f| good.corners(f)).collect(),
@@ -205,7 +200,7 @@ fn turn_inside_out(mut mesh: TriMesh) -> TriMesh {
     mesh
 }
 
-/// Broken or odd as surfaces.
+/// Files that are broken or odd in their surface.
 fn odd_surfaces() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
     let inner = scaled(&good, 0.3, Vec3::ONE);
