@@ -35,10 +35,12 @@ pub fn certificate(mut certificate: Value) -> Result<Value, String> {
             Ok(certificate)
         }
         Some(1 | 2) => Err(format!(
-            "the certificate is of version {version}, which claims less than a kit needs; `shellock verify OUT MODEL` writes a new one"
+            "the certificate is of version {version}, which claims less than a kit needs; `shellock verify \
+             OUT MODEL` writes a new one"
         )),
         Some(CERTIFICATE..) => Err(format!(
-            "the certificate is of version {version}, and this program reads 3 and {CERTIFICATE}: use that of a later release"
+            "the certificate is of version {version}, and this program reads 3 and {CERTIFICATE}: use that \
+             of a later release"
         )),
         _ => Err(format!("version {version} is not known")),
     }
@@ -49,7 +51,8 @@ pub fn plan(mut plan: Value) -> Result<Value, String> {
     let version = plan["version"].as_u64().unwrap_or(1);
     if version > PLAN {
         return Err(format!(
-            "plan.json is of version {version}, and this program reads 1 to {PLAN}: use that of a later release"
+            "plan.json is of version {version}, and this program reads 1 to {PLAN}: use that of a later \
+             release"
         ));
     }
     if version == 1 && plan["pieces"][0]["id"] == 0 {

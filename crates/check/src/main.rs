@@ -8,10 +8,11 @@ use std::process::ExitCode;
 
 use shellock_check::Verdict;
 
-const USAGE: &str = "usage: shellock-check OUT, where OUT is the folder of a kit with its certificate.json\n\
-    Confirms or refutes what the certificate claims of the pieces. Exit code 0: nothing refuted, 1: something refuted, 2: nothing to check.";
-const NOT_TESTED: &str = "Not tested: that the outside looks like the model, and how thick walls are (`shellock verify` does), \
-    and what report.html and the pictures show";
+const USAGE: &str = "usage: shellock-check OUT, where OUT is the folder of a kit with its \
+                     certificate.json\nConfirms or refutes what the certificate claims of the pieces. Exit \
+                     code 0: nothing refuted, 1: something refuted, 2: nothing to check.";
+const NOT_TESTED: &str = "Not tested: that the outside looks like the model, and how thick walls are \
+                          (`shellock verify` does), and what report.html and the pictures show";
 
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();

@@ -25,8 +25,9 @@ use crate::names::no_such;
 use crate::units;
 
 /// Exit codes, shown in the help.
-const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
-3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
+const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed \
+                          · 2 the input or an argument is wrong · 3 no plan could be found · 4 a file could \
+                          not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
 /// Version of the program, with the commit that a release was built from (`scripts/release`).
 fn version() -> &'static str {
@@ -199,16 +200,19 @@ pub struct StudioOptions {
 const EXAMPLES: [(&str, &str); 8] = [
     (
         "build",
-        "Examples:\n  shellock build dragon.stl --size 15cm --printer fdm\n  shellock build dragon.stl --keep-whole 0,-40,120,25 --pieces 8",
+        "Examples:\n  shellock build dragon.stl --size 15cm --printer fdm\n  shellock build dragon.stl \
+         --keep-whole 0,-40,120,25 --pieces 8",
     ),
     ("demo", "Example:\n  shellock demo --figure teddy --size 10cm"),
     (
         "segment",
-        "Example:\n  shellock segment dragon.stl --size 15cm --out dragon.3mf   (repaint it in a slicer, give it back to build)",
+        "Example:\n  shellock segment dragon.stl --size 15cm --out dragon.3mf   (repaint it in a slicer, \
+         give it back to build)",
     ),
     (
         "studio",
-        "Examples:\n  shellock studio dragon.stl\n  shellock studio --project dragon-studio   (goes on where you stopped)",
+        "Examples:\n  shellock studio dragon.stl\n  shellock studio --project dragon-studio   (goes on \
+         where you stopped)",
     ),
     (
         "batch",

@@ -168,7 +168,8 @@ impl<'a> Shop<'a> {
             Shown::Events => eprintln!("{}", json!({ "event": "again", "model": model })),
             Shown::ForPeople => {
                 println!(
-                    "{model}: the time was over before a kit passed; made again alone when all others are there"
+                    "{model}: the time was over before a kit passed; made again alone when all others are \
+                     there"
                 );
             }
         }

@@ -65,8 +65,8 @@ impl<'a> Fitting<'a> {
         while self.misfits(Some(n_pieces), None)?.1 > 0 {
             if n_pieces == MOST_PIECES {
                 return Err(Failure::Wrong(format!(
-                    "even {MOST_PIECES} pieces do not fit the printer {}; make it smaller (--size), or choose another \
-                     printer (--printer)",
+                    "even {MOST_PIECES} pieces do not fit the printer {}; make it smaller (--size), or \
+                     choose another printer (--printer)",
                     described(self.printer)
                 )));
             }
@@ -127,8 +127,8 @@ pub fn fitted(
         return Ok(params.clone());
     }
     if model.labels.is_some() {
-        let problem = "--pieces fits-bed chooses the pieces, but labels say what they are: leave out one of both \
-                       (--labels-from none leaves out those in the model's file)";
+        let problem = "--pieces fits-bed chooses the pieces, but labels say what they are: leave out one of \
+                       both (--labels-from none leaves out those in the model's file)";
         return Err(Failure::Wrong(problem.to_owned()));
     }
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;

@@ -264,7 +264,8 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> String {
         let [x, y, z] = b.at;
         let share = 100.0 * b.occluded;
         text += &format!(
-            "\n  piece {} is in the way of piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it hides {share:.0} % of it",
+            "\n  piece {} is in the way of piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it hides {share:.0} % \
+             of it",
             b.by, b.piece
         );
     }

@@ -97,8 +97,8 @@ impl<'a> Plate<'a> {
         let room = [width - 2.0 * EDGE_MM, depth - 2.0 * EDGE_MM, height];
         if size_mm.iter().zip(room).any(|(size, room)| *size > room) {
             return Err(Failure::Wrong(format!(
-                "the fit test needs {:.0} × {:.0} × {:.0} mm and {EDGE_MM} mm around it, more than the printer \"{}\" has \
-                 ({width} × {depth} × {height} mm)",
+                "the fit test needs {:.0} × {:.0} × {:.0} mm and {EDGE_MM} mm around it, more than the \
+                 printer \"{}\" has ({width} × {depth} × {height} mm)",
                 size_mm[0].ceil(),
                 size_mm[1].ceil(),
                 size_mm[2].ceil(),
@@ -190,8 +190,9 @@ impl<'a> Plate<'a> {
             );
         }
         println!(
-            "print it as it lies, without supports; the least number whose pin and key go in by hand is yours. Keep it, where it \
-             is 2 for example, with:\n  shellock coupon --printer {} --fits 2 --save workshop",
+            "print it as it lies, without supports; the least number whose pin and key go in by hand is \
+             yours. Keep it, where it is 2 for example, with:\n  shellock coupon --printer {} --fits 2 \
+             --save workshop",
             quoted(name)
         );
     }
@@ -227,7 +228,8 @@ fn tell_saved(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &
         println!("{value}");
     } else if session.shown != crate::progress::Shown::Nothing {
         println!(
-            "{}: printer \"{name}\" has clearance {}, on rails {}, tolerance {} mm; `shellock build MODEL --printer {}` uses them",
+            "{}: printer \"{name}\" has clearance {}, on rails {}, tolerance {} mm; `shellock build MODEL \
+             --printer {}` uses them",
             path.display(),
             fit.clearance_mm,
             fit.key_clearance_mm,
@@ -244,7 +246,8 @@ fn save(path: &Path, base: &Printer, fit: &Fit, name: &str) -> Result<(), Failur
     let is_called = |p: &Printer| p.name.eq_ignore_ascii_case(name);
     if Printer::presets().iter().any(is_called) {
         return Err(Failure::Wrong(format!(
-            "the printer \"{name}\" comes with the program and stays as it is; choose another name with --save"
+            "the printer \"{name}\" comes with the program and stays as it is; choose another name with \
+             --save"
         )));
     }
     if name.trim().is_empty() || name.chars().any(char::is_control) {
@@ -327,8 +330,8 @@ fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<Str
             return Ok(key);
         }
         return Err(format!(
-            "the printer \"{key}\" is there already and is like \"{like}\", not \"{}\"; name the printer that the plate was \
-             made for with --printer, or choose another name with --save",
+            "the printer \"{key}\" is there already and is like \"{like}\", not \"{}\"; name the printer \
+             that the plate was made for with --printer, or choose another name with --save",
             base.name
         ));
     }

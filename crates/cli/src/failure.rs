@@ -59,7 +59,8 @@ fn hint(error: &InputError, objects: &[String]) -> String {
         ""
     };
     format!(
-        "; the file's objects are {listed}: choose one with --object NAME{plate}, or --largest keeps the largest body"
+        "; the file's objects are {listed}: choose one with --object NAME{plate}, or --largest keeps the \
+         largest body"
     )
 }
 

@@ -176,19 +176,23 @@ fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
     match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
         Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
             model.notes.push(format!(
-                "of {n_before} triangles {} are enough: none is farther than {:.3} mm from the surface as it was given \
-                 (--resolution 0 uses all)",
+                "of {n_before} triangles {} are enough: none is farther than {:.3} mm from the surface as \
+                 it was given (--resolution 0 uses all)",
                 simple.solid.mesh().triangles.len(),
                 simple.farthest_mm
             ));
             let of = |labels: Vec<i64>| simple.source_face.iter().map(|&f| labels[f as usize]).collect();
             model.labels = model.labels.map(of);
-            model.file_face = simple.source_face.iter().map(|&f| model.file_face[f as usize]).collect();
+            model.file_face = simple
+                .source_face
+                .iter()
+                .map(|&f| model.file_face[f as usize])
+                .collect();
             model.solid = simple.solid;
         }
         _ => model.notes.push(format!(
-            "{n_before} triangles could not be made fewer within {resolution_mm} mm of the surface: all are used, \
-             which takes longer"
+            "{n_before} triangles could not be made fewer within {resolution_mm} mm of the surface: all are \
+             used, which takes longer"
         )),
     }
     Ok(model)
@@ -199,8 +203,8 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
     let sha256 = sha256(bytes);
     if options.model_sha256.as_ref().is_some_and(|of| *of != sha256) {
         return Err(Failure::Wrong(format!(
-            "{} is not the file that the project was made for (its SHA-256 is {sha256}): put that file back, or open this one in \
-             `shellock studio`",
+            "{} is not the file that the project was made for (its SHA-256 is {sha256}): put that file \
+             back, or open this one in `shellock studio`",
             path.display()
         )));
     }

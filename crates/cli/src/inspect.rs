@@ -189,8 +189,9 @@ pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
         String::new()
     };
     vec![format!(
-        "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; with such walls it is solid there, without \
-         connectors: make the model larger (--size) or the wall thinner (--thickness)",
+        "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; with such \
+         walls it is solid there, without connectors: make the model larger (--size) or the wall thinner \
+         (--thickness)",
         largest.join(", ")
     )]
 }

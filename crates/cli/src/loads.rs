@@ -55,8 +55,8 @@ fn note(design: &Design) -> String {
         " It is not pressed on its top: too narrow there, or it would tip over."
     };
     format!(
-        "Figures are {}. A load shows how pieces bend and part, far larger than it is; how the whole moves along is \
-         left out.{top}",
+        "Figures are {}. A load shows how pieces bend and part, far larger than it is; how the whole moves \
+         along is left out.{top}",
         bears::BY_SIMULATION
     )
 }

@@ -83,7 +83,8 @@ impl Destination {
         }
         if let Some(foreign) = foreign_file(&folder) {
             return refuse(&format!(
-                "holds {foreign}, which is not of the kit and would be lost; move it away, or choose another folder with -o"
+                "holds {foreign}, which is not of the kit and would be lost; move it away, or choose \
+                 another folder with -o"
             ));
         }
         let made = Self {

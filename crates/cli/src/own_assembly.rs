@@ -25,8 +25,8 @@ use crate::told::print_verdict;
 pub const ASSEMBLY: &str = "assembly.json";
 
 /// Example of the file, for error messages.
-const HOW: &str = "it looks like { \"clearance\": 0.1, \"pieces\": [{ \"file\": \"first.stl\" }, \
-                   { \"file\": \"key.stl\", \"pulled_out_along\": [0, 0, 1] }] }";
+const HOW: &str = "it looks like { \"clearance\": 0.1, \"pieces\": [{ \"file\": \"first.stl\" }, { \
+                   \"file\": \"key.stl\", \"pulled_out_along\": [0, 0, 1] }] }";
 
 /// Contents of the file `assembly.json`.
 #[derive(Deserialize)]

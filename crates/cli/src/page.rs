@@ -155,7 +155,8 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     let way_out = |(piece, poses): &(PatchId, Vec<[f64; 6]>)| ReportMotion {
         name: format!("piece {piece} comes out"),
         title: format!(
-            "how piece {piece} can be worked out of its place though it is not the key: do not print this kit"
+            "how piece {piece} can be worked out of its place though it is not the key: do not print this \
+             kit"
         ),
         is_loop: false,
         moves: vec![ReportMove {

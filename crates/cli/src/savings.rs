@@ -34,11 +34,11 @@ const MOST_CONFIG_BYTES: u64 = 1 << 20;
 /// Settings for both technologies that differ from the slicer's defaults, on a bed that holds everything. The
 /// resin printer's display is coarse: its pixels cost time here and change little.
 const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
-const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
-    supports_enable = 1\npad_enable = 1\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
-    display_pixels_y = 1000\n";
-const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\nperimeters = 2\n\
-    fill_density = 15%\n";
+const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = \
+                            35\nfaded_layers = 10\nsupports_enable = 1\npad_enable = 1\ndisplay_width = \
+                            1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\ndisplay_pixels_y = 1000\n";
+const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = \
+                            0\nperimeters = 2\nfill_density = 15%\n";
 /// Further settings for the whole model in resin.
 const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
 /// Further settings for a filled model: 100 % infill instead of 15 %.
@@ -93,8 +93,8 @@ fn print(told: &Value) {
     );
     for (name, time) in told["print_time"].as_object().into_iter().flatten() {
         println!(
-            "{name}   {:5.1} % of the time and {:.1} % of the material of the whole model {}: {:.1} h and {:.0} g instead of \
-             {:.1} h and {:.0} g, by {}",
+            "{name}   {:5.1} % of the time and {:.1} % of the material of the whole model {}: {:.1} h and \
+             {:.0} g instead of {:.1} h and {:.0} g, by {}",
             percent(&time["ratio"]),
             percent(&time["material_ratio"]),
             time["solid_as"].as_str().unwrap_or_default(),

@@ -64,8 +64,8 @@ pub fn filled_again(solid: Solid, repairs: &[&str]) -> Result<Solid, String> {
         return Ok(solid);
     }
     let hollow = find_hollow(&solid, LEAST_FILLED).ok_or_else(|| {
-        "the kit was made of a hollow model that was filled, but no cavity is found in this one: name the model that the \
-         kit was made from"
+        "the kit was made of a hollow model that was filled, but no cavity is found in this one: name the \
+         model that the kit was made from"
             .to_owned()
     })?;
     fill(&solid, &hollow)
@@ -135,8 +135,8 @@ fn slit_warning(model: &Model, options: &Options) -> Option<String> {
         )
     };
     Some(format!(
-        "{n} narrower than {below_mm:.2} mm: {}; pieces on both sides have less room than a seam needs, and prints fuse \
-         there: close it or make it wider in a modelling program",
+        "{n} narrower than {below_mm:.2} mm: {}; pieces on both sides have less room than a seam needs, and \
+         prints fuse there: close it or make it wider in a modelling program",
         places(&found, told)
     ))
 }

@@ -203,7 +203,8 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         tested.strength_mpa
     );
     println!(
-        "design           test   force N  opening mm  play mm  between   walls MPa  connectors MPa  of strength  verdict"
+        "design           test   force N  opening mm  play mm  between   walls MPa  connectors MPa  of \
+         strength  verdict"
     );
     for (name, punch, drop) in tested.rows() {
         for (test, o) in [("punch", punch), ("fall", drop)] {
@@ -215,7 +216,8 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         return;
     };
     println!(
-        "printed: the finished pieces with their gaps; μ: friction; the others: walls and connectors without gaps"
+        "printed: the finished pieces with their gaps; μ: friction; the others: walls and connectors \
+         without gaps"
     );
     for (name, pair) in compared.designs() {
         if let Some(score) = pair.score {
@@ -235,7 +237,8 @@ fn print_key(tested: &StressReport) {
         for (done, o) in [("the punch", &printed.punch), ("the fall", &printed.drop)] {
             if o.key_slides_mm >= SEEN_MM && o.key_slides_mm.is_finite() {
                 println!(
-                    "with friction {} the key slides out by {:.1} mm in {done}: push it back, or build with --detent 0.2",
+                    "with friction {} the key slides out by {:.1} mm in {done}: push it back, or build with \
+                     --detent 0.2",
                     printed.friction, o.key_slides_mm
                 );
             }

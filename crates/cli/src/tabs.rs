@@ -38,19 +38,33 @@ fn settings(printer: &Printer) -> Vec<String> {
     let layer = printer.layer_mm;
     let own = match printer.process {
         Process::Sla => [
-            format!("Layers of {layer} mm, the exposure that your resin asks for. Turn hollowing and drain holes off: the pieces are hollow."),
-            "Supports on, from the plate: pieces lie so that most of them stand on inner sides. Keep tips out of channels and off seams.".into(),
+            format!(
+                "Layers of {layer} mm, the exposure that your resin asks for. Turn hollowing and drain \
+                 holes off: the pieces are hollow."
+            ),
+            "Supports on, from the plate: pieces lie so that most of them stand on inner sides. Keep tips \
+             out of channels and off seams."
+                .into(),
         ],
         Process::Fdm => [
-            format!("Layers of {layer} mm, 3 walls or more, so that thin walls and connectors are solid. Infill hardly matters."),
-            "Supports on, from the plate only, with a gap that comes off clean. No brim and no elephant foot on seams.".into(),
+            format!(
+                "Layers of {layer} mm, 3 walls or more, so that thin walls and connectors are solid. Infill \
+                 hardly matters."
+            ),
+            "Supports on, from the plate only, with a gap that comes off clean. No brim and no elephant \
+             foot on seams."
+                .into(),
         ],
         Process::Sls => [
             format!("Layers of {layer} mm. No supports."),
             "Turn compensation of holes off: gaps are made for your printer's tolerance already.".into(),
         ],
     };
-    let mut all = vec!["Open plates.3mf (or a plate of its own). Do not scale it, and do not turn pieces: they lie as they print best.".to_owned()];
+    let mut all = vec![
+        "Open plates.3mf (or a plate of its own). Do not scale it, and do not turn pieces: they lie as they \
+         print best."
+            .to_owned(),
+    ];
     all.extend(own);
     all
 }
@@ -91,7 +105,9 @@ pub fn failed() -> Section {
     Section {
         title: "Do not print this kit".into(),
         lines: vec![
-            "It failed its checks: pieces would come loose, rub or rattle. The page (report.html) says which and where.".into(),
+            "It failed its checks: pieces would come loose, rub or rattle. The page (report.html) says \
+             which and where."
+                .into(),
         ],
     }
 }
@@ -100,8 +116,9 @@ pub fn failed() -> Section {
 pub fn after(has_passed: bool) -> Vec<Section> {
     let apart = section(taking_apart());
     let worth = if has_passed {
-        "What it bears and how far pieces can be wiggled is computed, not tried on a print; printers differ. Handle it as what it is: a \
-         hollow thing held by small connectors. No warranty of any kind comes with it."
+        "What it bears and how far pieces can be wiggled is computed, not tried on a print; printers differ. \
+         Handle it as what it is: a hollow thing held by small connectors. No warranty of any kind comes \
+         with it."
     } else {
         "This kit failed its checks and is not meant to be printed."
     };
@@ -125,7 +142,9 @@ fn taking_apart() -> ReportPart {
     ReportPart::Text(
         "Taking it apart".into(),
         vec![
-            "The key goes out first, the way it came in; then the pieces from the last to the first. No other piece comes out before.".into(),
+            "The key goes out first, the way it came in; then the pieces from the last to the first. No \
+             other piece comes out before."
+                .into(),
         ],
     )
 }
@@ -134,7 +153,8 @@ fn taking_apart() -> ReportPart {
 pub fn care(printer: &Printer) -> ReportTab {
     let clean: Vec<&str> = match printer.process {
         Process::Sla => vec![
-            "Take supports off before the resin is hard, then wash twice. Blow channels and grooves dry: what stays in them is felt as too tight.",
+            "Take supports off before the resin is hard, then wash twice. Blow channels and grooves dry: \
+             what stays in them is felt as too tight.",
             "Let it dry, then harden every side. Sand stubs of supports on seams flat.",
         ],
         Process::Fdm => vec![
@@ -156,20 +176,24 @@ pub fn care(printer: &Printer) -> ReportTab {
             text(
                 "Before all: the fit test",
                 &[
-                    "`shellock coupon` makes a plate of half an hour that tells which clearance fits on your printer. Print it once before a large kit.",
+                    "`shellock coupon` makes a plate of half an hour that tells which clearance fits on \
+                     your printer. Print it once before a large kit.",
                 ],
             ),
             text(
                 "Too tight",
                 &[
-                    "Do not force it: find where it rubs, mostly a stub of a support or a first layer, and sand that.",
-                    "If all seams are tight, wet sand channels, or make the kit again with a larger --clearance and --seam-gap, 0.03 mm at a time.",
+                    "Do not force it: find where it rubs, mostly a stub of a support or a first layer, and \
+                     sand that.",
+                    "If all seams are tight, wet sand channels, or make the kit again with a larger \
+                     --clearance and --seam-gap, 0.03 mm at a time.",
                 ],
             ),
             text(
                 "Too loose",
                 &[
-                    "Some play is meant: the Play page shows how much. A key that falls out is held by a strip of tape inside its groove.",
+                    "Some play is meant: the Play page shows how much. A key that falls out is held by a \
+                     strip of tape inside its groove.",
                     "If all pieces rattle, make the kit again with a smaller --clearance, 0.03 mm at a time.",
                 ],
             ),

@@ -60,7 +60,8 @@ impl Finished<'_> {
             );
             print_failures(verdict, standing);
             eprintln!(
-                "What may help: another number of pieces (--pieces), a larger --size, labels of your own (--labels), more --time."
+                "What may help: another number of pieces (--pieces), a larger --size, labels of your own \
+                 (--labels), more --time."
             );
         }
     }
@@ -102,7 +103,8 @@ pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) ->
         String::new()
     };
     format!(
-        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears ({})",
+        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the \
+         material bears ({})",
         strength.stress_mpa,
         material.strength_mpa,
         standing.words(strength.at.to_array())
@@ -138,7 +140,8 @@ pub fn quality(proof: &PlanProof) -> String {
     };
     let percent = 100.0 * gap;
     format!(
-        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} ({percent:.1} % below)"
+        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} \
+         ({percent:.1} % below)"
     )
 }
 
@@ -205,7 +208,8 @@ pub fn fits(made: &Design) -> Option<String> {
         None => String::new(),
     };
     Some(format!(
-        "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is {least_mm:.2} mm){thin}"
+        "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is \
+         {least_mm:.2} mm){thin}"
     ))
 }
 

@@ -127,8 +127,8 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
 fn an_open_surface_is_refused_with_its_place() {
     let dir = tempfile::tempdir().unwrap();
     // The surface is a box without a lid.
-    let open = "v 0 0 0\nv 30 0 0\nv 30 30 0\nv 0 30 0\nv 0 0 30\nv 30 0 30\nv 30 30 30\nv 0 30 30\n\
-                f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    let open = "v 0 0 0\nv 30 0 0\nv 30 30 0\nv 0 30 0\nv 0 0 30\nv 30 0 30\nv 30 30 30\nv 0 30 30\nf 1 4 3 \
+                2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     fs::write(dir.path().join("open.obj"), open).unwrap();
     let o = shellock(dir.path(), &["build", "open.obj"]);
     assert_eq!(code(&o), 2);
@@ -340,8 +340,8 @@ fn what_is_not_there_is_named() {
 /// Cube for the tests: closed, one body, with the labels `label` on its faces.
 fn labelled_cube(label: [i32; 12]) -> String {
     let mut ply = String::from(
-        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
-         element face 12\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n",
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float \
+         z\nelement face 12\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n",
     );
     for i in 0..8 {
         ply += &format!("{} {} {}\n", 80 * (i & 1), 80 * (i >> 1 & 1), 80 * (i >> 2));

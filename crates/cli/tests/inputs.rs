@@ -356,7 +356,9 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
         "{told}"
     );
     let pieces = |args: &[&str]| -> Value {
-        serde_json::from_str::<Value>(&run(&[args, &["--json", "-o", "again.ply"]].concat())).unwrap()["pieces"].clone()
+        serde_json::from_str::<Value>(&run(&[args, &["--json", "-o", "again.ply"]].concat())).unwrap()
+            ["pieces"]
+            .clone()
     };
     assert_eq!(
         pieces(&["segment", "painted.3mf"]),

@@ -24,7 +24,8 @@ pub enum ReadError {
     },
     /// An archive with an unsupported compression, or with a password.
     #[error(
-        "the archive cannot be opened ({reason}); pack it again as an ordinary zip, or give the plain mesh file"
+        "the archive cannot be opened ({reason}); pack it again as an ordinary zip, or give the plain mesh \
+         file"
     )]
     Packing {
         /// Message of the unpacking library.
@@ -93,8 +94,8 @@ pub enum ReadError {
     },
     /// A 3MF that requires an unsupported extension: its shape would be wrong without.
     #[error(
-        "the file requires the 3MF extension \"{name}\", which is not read; export it as a plain mesh: 3MF without \
-         extensions, or STL"
+        "the file requires the 3MF extension \"{name}\", which is not read; export it as a plain mesh: 3MF \
+         without extensions, or STL"
     )]
     Extension {
         /// Common name of the extension, or its namespace.
@@ -102,8 +103,8 @@ pub enum ReadError {
     },
     /// An object whose shape is given in an unsupported way.
     #[error(
-        "{object} is not given by a mesh alone, but by \"{shape}\", which is not read; export it as a plain mesh: 3MF \
-         without extensions, or STL"
+        "{object} is not given by a mesh alone, but by \"{shape}\", which is not read; export it as a plain \
+         mesh: 3MF without extensions, or STL"
     )]
     Shape {
         /// Object, by its name or number.
@@ -113,7 +114,8 @@ pub enum ReadError {
     },
     /// Tool paths for a printer instead of a model.
     #[error(
-        "this is a sliced file: it holds G-code for a printer and no model; give the project that it was sliced from (.3mf)"
+        "this is a sliced file: it holds G-code for a printer and no model; give the project that it was \
+         sliced from (.3mf)"
     )]
     Sliced,
     /// A file in which nothing is to be printed.
@@ -172,14 +174,14 @@ pub enum ReadError {
     },
     /// A zip archive with a file of a 3MF in it that no relation names.
     #[error(
-        "the file is a zip archive with a .model file in it, but no 3MF: neither does _rels/.rels name a model nor is there \
-         3D/3dmodel.model; export it again as 3MF, or unpack it and give the mesh in it"
+        "the file is a zip archive with a .model file in it, but no 3MF: neither does _rels/.rels name a \
+         model nor is there 3D/3dmodel.model; export it again as 3MF, or unpack it and give the mesh in it"
     )]
     NoRoot,
     /// Settings of a slicer that cannot be read.
     #[error(
-        "{part}, {at}: {reason}; so the roles of parts are unknown, such as which are cut out: save the project again in the \
-         slicer, or export plain 3MF or STL"
+        "{part}, {at}: {reason}; so the roles of parts are unknown, such as which are cut out: save the \
+         project again in the slicer, or export plain 3MF or STL"
     )]
     Settings {
         /// The file within the package.
@@ -215,7 +217,8 @@ pub enum ReadError {
     },
     /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.
     #[error(
-        "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"
+        "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove \
+         the paint"
     )]
     Paint {
         /// Index of the triangle within its object.
@@ -233,8 +236,8 @@ pub enum ReadError {
     },
     /// A count in a header that cannot be true.
     #[error(
-        "{at}: the header promises {promised} {what}, but the file has room for {room} only; \
-         it was cut off or its header is wrong: copy or export it again"
+        "{at}: the header promises {promised} {what}, but the file has room for {room} only; it was cut off \
+         or its header is wrong: copy or export it again"
     )]
     TooFewBytes {
         /// Place of the count, or of the items counted.
@@ -256,8 +259,8 @@ pub enum ReadError {
     },
     /// A face that refers to a missing point.
     #[error(
-        "{at}: a face uses point {index}, but the file has {n_points} points, counted from {first}; \
-         export the model again"
+        "{at}: a face uses point {index}, but the file has {n_points} points, counted from {first}; export \
+         the model again"
     )]
     MissingPoint {
         /// Place of the face.

@@ -130,7 +130,8 @@ fn note_of_others(passed_over: &BTreeMap<&[u8], usize>) -> Option<String> {
     let more = if passed_over.len() > QUOTED { ", …" } else { "" };
     (n > 0).then(|| {
         format!(
-            "statements that are not read were passed over: {n}, by {}{more}; surfaces among them are missing",
+            "statements that are not read were passed over: {n}, by {}{more}; surfaces among them are \
+             missing",
             shown.collect::<Vec<_>>().join(", ")
         )
     })
@@ -272,8 +273,8 @@ mod tests {
 
     #[test]
     fn names_may_have_a_number_sign_and_what_is_not_read_is_noted() {
-        let text = "o Part#1\nv 0 0 0 # a corner\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl Mat #1\nf 1 3 2\nf 1 2 4 # a face\n\
-                    o Part#2\nusemtl Mat #2\nf 2 3 4\nf 1 4 3\nF 1 2 3\nsurf 0 1 0 1 1 2\n";
+        let text = "o Part#1\nv 0 0 0 # a corner\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl Mat #1\nf 1 3 2\nf 1 2 \
+                    4 # a face\no Part#2\nusemtl Mat #2\nf 2 3 4\nf 1 4 3\nF 1 2 3\nsurf 0 1 0 1 1 2\n";
         let loaded = read(text.as_bytes()).unwrap();
         assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 0, 1, 1][..]));
         let names: Vec<Option<&str>> = loaded.objects.iter().map(|o| o.name.as_deref()).collect();

@@ -164,9 +164,9 @@ mod tests {
         };
         let [a, b, c] = of_faces;
         read(&format!(
-            "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n{declared}\n\
-             element face 3\nproperty list uchar int vertex_indices\n{face_colors}end_header\n{}\
-             3 0 1 2 {a}\n3 0 1 3 {b}\n4 1 4 2 3 {c}\n",
+            "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float \
+             z\n{declared}\nelement face 3\nproperty list uchar int \
+             vertex_indices\n{face_colors}end_header\n{}3 0 1 2 {a}\n3 0 1 3 {b}\n4 1 4 2 3 {c}\n",
             points.concat()
         ))
     }
@@ -237,7 +237,8 @@ mod tests {
     fn an_off_has_colours_of_points_if_its_first_word_says_so() {
         let off = |word: &str, [a, b, c, d]: [&str; 4]| {
             let text = format!(
-                "{word}\n4 4 0\n0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n0 0 1 {d}\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
+                "{word}\n4 4 0\n0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n0 0 1 {d}\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 \
+                 3 2\n"
             );
             read(&text).labels(LabelSource::Color).map(<[i64]>::to_vec)
         };

@@ -120,8 +120,9 @@ impl Polygons {
             cutters: Vec::new(),
             notes: Vec::from_iter((n_folded > 0).then(|| {
                 format!(
-                    "{n_folded} of the file's polygons cross themselves or are far from flat; their triangles may \
-                     fold over each other, so export triangles instead if the surface is wrong there"
+                    "{n_folded} of the file's polygons cross themselves or are far from flat; their \
+                     triangles may fold over each other, so export triangles instead if the surface is \
+                     wrong there"
                 )
             })),
         })
@@ -208,8 +209,8 @@ mod tests {
         let mut obj = String::new();
         let mut off = format!("OFF\n{} {} 0\n", points.len(), faces.len());
         let mut ply = format!(
-            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float \
+             z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
             points.len(),
             faces.len()
         );

@@ -151,7 +151,8 @@ fn wrong_counts_trailing_bytes_and_colours_of_stl() {
 
 #[test]
 fn groups_materials_and_colours_divide_and_a_single_one_does_not() {
-    let grouped = "o thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\ng a b\nusemtl red\nf 1 2 4\ng c\nf 2 3 4\ng a b\nf 1 4 3\n";
+    let grouped = "o thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\ng a b\nusemtl red\nf 1 2 4\ng c\nf \
+                   2 3 4\ng a b\nf 1 4 3\n";
     let loaded = read(grouped).unwrap();
     assert_eq!(loaded.labels(LabelSource::Group), Some(&[-1, 0, 1, 0][..]));
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[-1, 0, 0, 0][..]));
@@ -159,9 +160,10 @@ fn groups_materials_and_colours_divide_and_a_single_one_does_not() {
         (loaded.labels(LabelSource::Object), loaded.face_labels()),
         (None, None)
     );
-    let colored = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-                   element face 3\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n\
-                   property uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n3 0 1 3 0 0 255\n4 0 1 2 3 255 0 0\n";
+    let colored = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty \
+                   float z\nelement face 3\nproperty list uchar int vertex_indices\nproperty uchar \
+                   red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 \
+                   1\n3 0 1 2 255 0 0\n3 0 1 3 0 0 255\n4 0 1 2 3 255 0 0\n";
     assert_eq!(
         read(colored).unwrap().labels(LabelSource::Color),
         Some(&[0, 1, 0, 0][..])
@@ -172,9 +174,9 @@ fn groups_materials_and_colours_divide_and_a_single_one_does_not() {
 
 #[test]
 fn strips_of_ply_turn_every_other_triangle_and_begin_anew() {
-    let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
-                element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
-                0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n9 0 1 2 3 3 -1 1 4 3\n";
+    let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float \
+                z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 \
+                0\n1 1 0\n2 1 0\n9 0 1 2 3 3 -1 1 4 3\n";
     assert_eq!(
         read(text).unwrap().mesh.triangles,
         [[0, 1, 2], [2, 1, 3], [1, 4, 3]]
@@ -228,8 +230,8 @@ fn broken_stl_is_refused_with_its_place() {
 
 #[test]
 fn obj_quirks() {
-    let text = "\u{FEFF}# BOM\r\nmtllib a.mtl\r\nv 0 0 0 1 0 0\r\nv 1 0 0\r\nv 1 1 0 # corner\r\nv 0 1 0\r\nvt 0 0\r\n\
-                f 1/1/1 2//1 \\\r\n  3/1 4\r\nl 1 2\r\nf -4 -3 -2\r\nf 5 1 2\r\nv 0 0 1";
+    let text = "\u{FEFF}# BOM\r\nmtllib a.mtl\r\nv 0 0 0 1 0 0\r\nv 1 0 0\r\nv 1 1 0 # corner\r\nv 0 1 \
+                0\r\nvt 0 0\r\nf 1/1/1 2//1 \\\r\n  3/1 4\r\nl 1 2\r\nf -4 -3 -2\r\nf 5 1 2\r\nv 0 0 1";
     let loaded = read(text).unwrap();
     assert_eq!(
         loaded.mesh.triangles,
@@ -345,10 +347,10 @@ fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
 fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     let header = |format: &str| {
         format!(
-            "ply\r\nformat {format} 1.0\r\ncomment made by hand\r\nelement camera 1\r\nproperty list uchar short k\r\n\
-             element vertex 4\r\nproperty uchar red\r\nproperty double x\r\nproperty float y\r\nproperty int z\r\n\
-             property list uint8 float extra\r\nelement face 2\r\nproperty char flag\r\nproperty int Label\r\n\
-             property list ushort uint vertex_indices\r\nend_header\r\n"
+            "ply\r\nformat {format} 1.0\r\ncomment made by hand\r\nelement camera 1\r\nproperty list uchar \
+             short k\r\nelement vertex 4\r\nproperty uchar red\r\nproperty double x\r\nproperty float \
+             y\r\nproperty int z\r\nproperty list uint8 float extra\r\nelement face 2\r\nproperty char \
+             flag\r\nproperty int Label\r\nproperty list ushort uint vertex_indices\r\nend_header\r\n"
         )
     };
     let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, -2]];
@@ -391,9 +393,9 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
 fn labels_of_a_float_property_divide_where_they_are_whole() {
     let ply = |label: &str| {
         read(format!(
-            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-             element face 2\nproperty list uchar int vertex_indices\nproperty float label\nend_header\n\
-             0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1.0\n3 0 2 1 {label}\n"
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float \
+             z\nelement face 2\nproperty list uchar int vertex_indices\nproperty float label\nend_header\n0 \
+             0 0\n1 0 0\n0 1 0\n3 0 1 2 1.0\n3 0 2 1 {label}\n"
         ))
         .unwrap()
     };
@@ -431,7 +433,8 @@ fn written_labels_are_read_again() {
 fn counts_that_lie_reserve_nothing() {
     let ply = |count: &str| {
         format!(
-            "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
+            "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty \
+             float z\nend_header\n0 0 0\n"
         )
     };
     assert!(matches!(

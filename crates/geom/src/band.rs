@@ -39,7 +39,8 @@ pub struct Band {
 /// Error: the grid would have too many nodes along an axis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "a grid of {cell_mm} mm along {size_mm:.1} mm has more than 65 000 steps; use a coarser grid or a smaller model"
+    "a grid of {cell_mm} mm along {size_mm:.1} mm has more than 65 000 steps; use a coarser grid or a \
+     smaller model"
 )]
 pub struct GridTooFine {
     cell_mm: f64,

@@ -71,8 +71,8 @@ fn main() -> Any<()> {
     };
     let folder = tempfile::tempdir()?;
     println!(
-        "| T | load on a | opening | lines | faces | tip of a | lines | faces | tip of b | lines | faces | off lines | \
-         off faces |"
+        "| T | load on a | opening | lines | faces | tip of a | lines | faces | tip of b | lines | faces | \
+         off lines | off faces |"
     );
     println!("| --: | :-- |{}", " --: |".repeat(11));
     let mut meshes = String::new();
@@ -362,7 +362,8 @@ Rotate {{{{0, 0, 1}}, {{0, 0, 0}}, {angle}}} {{ Surface{{1:4}}; }}
 Rectangle(5) = {{{mh}, {mp}, 0, {h}, {pin}}};\nRectangle(6) = {{0, {mp}, 0, {h}, {pin}}};\n{feet}
 BooleanFragments{{ Surface{{:}}; Delete; }}{{}}
 Physical Surface(\"ALL\") = {{Surface{{:}}}};
-Field[1] = MathEval;\nField[1].F = \"Min({far}, {near} + 0.25 * Max(Sqrt(x*x+y*y) - 2, 0))\";\nBackground Field = 1;
+Field[1] = MathEval;\nField[1].F = \"Min({far}, {near} + 0.25 * Max(Sqrt(x*x+y*y) - 2, 0))\";\nBackground \
+             Field = 1;
 Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGroupsOfNodes = 0;\n",
             mw = -WIDTH,
             w = WIDTH,

@@ -62,7 +62,8 @@ const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 pub enum ShellError {
     /// Young's modulus not in (0, 10¹²], or Poisson's ratio not in [0, 0.49].
     #[error(
-        "no shell is made of E = {youngs_modulus_mpa} MPa, ν = {poissons_ratio}: E must be in (0, 1e12], ν in [0, 0.49]"
+        "no shell is made of E = {youngs_modulus_mpa} MPa, ν = {poissons_ratio}: E must be in (0, 1e12], ν \
+         in [0, 0.49]"
     )]
     Material {
         /// Young's modulus E, MPa.
@@ -114,7 +115,8 @@ pub enum ShellError {
     },
     /// A connected part has loads that do not balance and no held node.
     #[error(
-        "case {case} pushes the part of the shell that has point {point}, and none of its nodes hold: hold some there"
+        "case {case} pushes the part of the shell that has point {point}, and none of its nodes hold: hold \
+         some there"
     )]
     Unbalanced {
         /// Index of the load case.

@@ -5,8 +5,9 @@ use std::fmt::Write;
 /// Starts a document with a white background, `width` × `height` pixels.
 pub fn begin(width: f64, height: f64) -> String {
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 \
+         {width} {height}\" font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"{width}\" \
+         height=\"{height}\" fill=\"white\"/>\n"
     )
 }
 

@@ -206,8 +206,9 @@ pub enum StrengthError {
     Shell(#[from] ShellError),
     /// There is almost no cavity between two walls.
     #[error(
-        "the model is hardly anywhere thicker than two walls of {wall_mm} mm, the thinnest that is made, so there is nothing to hollow \
-         out; print it solid, make it larger, or give a thinner wall with --thickness"
+        "the model is hardly anywhere thicker than two walls of {wall_mm} mm, the thinnest that is made, so \
+         there is nothing to hollow out; print it solid, make it larger, or give a thinner wall with \
+         --thickness"
     )]
     NothingHollow {
         /// Thickness of the thinnest wall, mm.

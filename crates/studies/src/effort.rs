@@ -284,7 +284,8 @@ fn text(runs: &[Run]) -> String {
     let n = |code: i32| runs.iter().filter(|r| r.exit_code == Some(code)).count();
     let _ = write!(
         text,
-        "\n{} jobs: {} verified, {} failed, {} without a plan, {} refused, {} given up; {:.2} kits made for one; {:.0} CPU s in all; slowest {:.0} s\n",
+        "\n{} jobs: {} verified, {} failed, {} without a plan, {} refused, {} given up; {:.2} kits made for \
+         one; {:.0} CPU s in all; slowest {:.0} s\n",
         runs.len(),
         n(0),
         n(1),

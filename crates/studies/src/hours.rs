@@ -29,9 +29,9 @@ const SKIN_MM: f64 = 0.05;
 const N_OWN_TIME: usize = 4;
 const N_OWN_PLASTIC: usize = 3;
 /// Settings that differ from PrusaSlicer's defaults; the bed holds everything.
-const SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nskirts = 0\nperimeters = 2\n\
-    fill_density = 15%\nlayer_height = 0.2\nfirst_layer_height = 0.2\n\
-    bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
+const SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nskirts = 0\nperimeters = \
+                        2\nfill_density = 15%\nlayer_height = 0.2\nfirst_layer_height = 0.2\nbed_shape = \
+                        0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 
 /// Which kits, and what of them.
 #[derive(Args)]

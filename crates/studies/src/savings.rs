@@ -32,14 +32,15 @@ const HEAD: [&str; 9] = [
     "FDM, solid filled",
 ];
 
-const INTRODUCTION: &str = "# What kits save\n\n\
-    Of finished kits, as `shellock report` tells it: material and print time of all pieces over those of the solid model (the paper's \
-    Table 1 has 20 to 54 % and 23 to 69 %). Made by `cargo xtask savings KIT...`.\n\n\
-    Pieces lie on plates as in `plates.3mf`, the whole model in its own best pose, both with supports and the same settings. Resin \
-    printers with a display take the same time for every layer, so there the height of the plates counts alone; filament printers pay for \
-    walls, and for supports. Times by PrusaSlicer are its own estimates: for resin with 0.05 mm layers, a pad and supports, the whole \
-    model hollowed to 2 mm; for filament with its own defaults, but two perimeters, 15 % infill, 0.2 mm layers and supports. The last \
-    column is over a whole model that is filled to 100 %.\n\n";
+const INTRODUCTION: &str = "# What kits save\n\nOf finished kits, as `shellock report` tells it: material and print time of all \
+     pieces over those of the solid model (the paper's Table 1 has 20 to 54 % and 23 to 69 %). Made by \
+     `cargo xtask savings KIT...`.\n\nPieces lie on plates as in `plates.3mf`, the whole model in its own \
+     best pose, both with supports and the same settings. Resin printers with a display take the same time \
+     for every layer, so there the height of the plates counts alone; filament printers pay for walls, and \
+     for supports. Times by PrusaSlicer are its own estimates: for resin with 0.05 mm layers, a pad and \
+     supports, the whole model hollowed to 2 mm; for filament with its own defaults, but two perimeters, 15 \
+     % infill, 0.2 mm layers and supports. The last column is over a whole model that is filled to 100 \
+     %.\n\n";
 
 /// Writes the table; returns its file.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {

@@ -21,11 +21,12 @@ const TOKEN_BYTES: usize = 32;
 const MOST_AT_ONCE: f64 = 200.0;
 const MOST_PER_SECOND: f64 = 100.0;
 /// Policy of the studio's page, which loads nothing from other servers.
-const PAGE_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; frame-src 'self'; \
-                           object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
+const PAGE_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' \
+                           'unsafe-inline'; frame-src 'self'; object-src 'none'; base-uri 'none'; \
+                           form-action 'none'; frame-ancestors 'self'";
 /// Policy of a kit's own page, which is self-contained.
-const KIT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; \
-                          font-src data:; frame-ancestors 'self'";
+const KIT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src \
+                          'unsafe-inline'; img-src data: blob:; font-src data:; frame-ancestors 'self'";
 
 /// Generates a random token, in hexadecimal digits.
 pub fn token() -> std::io::Result<String> {

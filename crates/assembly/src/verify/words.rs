@@ -59,13 +59,13 @@ impl Finding {
                 volume_mm3,
                 at,
             } => format!(
-                "on its way in, {travel_mm:.1} mm from its place, piece {piece} runs into piece {against} by {volume_mm3:.2} mm³, \
-                 {thickness_mm:.3} mm thick, {}",
+                "on its way in, {travel_mm:.1} mm from its place, piece {piece} runs into piece {against} \
+                 by {volume_mm3:.2} mm³, {thickness_mm:.3} mm thick, {}",
                 words.place(*at)
             ),
             Self::Loose { piece, directions } => format!(
-                "piece {piece} comes off by itself in {} of the directions that are tried, first {}; \
-                 longer seams hold better: try fewer pieces, a larger model or other labels",
+                "piece {piece} comes off by itself in {} of the directions that are tried, first {}; longer \
+                 seams hold better: try fewer pieces, a larger model or other labels",
                 directions.len(),
                 words.way(directions.first().copied().unwrap_or_default())
             ),
@@ -80,13 +80,15 @@ impl Finding {
                 most,
                 at,
             } => format!(
-                "piece {piece} {}, {}: its seams are too short for the clearance; try fewer pieces, a larger model, labels that cut where \
-                 it is wider, or a smaller --clearance if your printer holds it",
+                "piece {piece} {}, {}: its seams are too short for the clearance; try fewer pieces, a \
+                 larger model, labels that cut where it is wider, or a smaller --clearance if your printer \
+                 holds it",
                 too_wide(play, *most),
                 words.place(*at)
             ),
             Self::ComesOut { piece, at } => format!(
-                "piece {piece} can be worked out by hand, turned past its connectors, {}: join it to a neighbour, or cut where it is wider",
+                "piece {piece} can be worked out by hand, turned past its connectors, {}: join it to a \
+                 neighbour, or cut where it is wider",
                 words.place(*at)
             ),
             Self::SurfaceLost { fraction, at } => format!(

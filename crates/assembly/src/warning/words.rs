@@ -58,7 +58,8 @@ impl Warning {
             Cause::StrengthUnknown { error, thickness_mm } => warning(
                 "strength-unknown",
                 format!(
-                    "what the wall of {thickness_mm:.2} mm bears is not known ({error}); handle the kit with care"
+                    "what the wall of {thickness_mm:.2} mm bears is not known ({error}); handle the kit \
+                     with care"
                 ),
             ),
             Cause::WallTooWeak {
@@ -81,8 +82,8 @@ impl Warning {
                 tell(
                     "wall-too-weak",
                     format!(
-                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m: its stress is {:.1} times what the \
-                         material bears{thicker}; print it larger, or do not drop it",
+                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m: its stress is \
+                         {:.1} times what the material bears{thicker}; print it larger, or do not drop it",
                         stress_mpa / strength_mpa
                     ),
                 )
@@ -95,8 +96,8 @@ impl Warning {
             } => note(
                 "too-thin-to-hollow",
                 format!(
-                    "{:.1} % of the surface, in {n_places} {}, is solid and without connectors: too thin there for a hollow \
-                     between walls of {thickness_mm:.2} mm",
+                    "{:.1} % of the surface, in {n_places} {}, is solid and without connectors: too thin \
+                     there for a hollow between walls of {thickness_mm:.2} mm",
                     100.0 * share,
                     if *n_places == 1 { "place" } else { "places" }
                 ),
@@ -107,21 +108,24 @@ impl Warning {
             } => note(
                 "wall-thin-for-room",
                 format!(
-                    "walls are {thickness_mm:.1} mm thick and not {usual_mm:.1}, as connectors have little room in a model so thin; a \
-                     larger --size has room for both"
+                    "walls are {thickness_mm:.1} mm thick and not {usual_mm:.1}, as connectors have little \
+                     room in a model so thin; a larger --size has room for both"
                 ),
             ),
             Cause::WallForUse { from_mm, to_mm, done } => note(
                 "wall-for-use",
                 format!(
-                    "walls are {to_mm:.1} mm thick where {from_mm:.1} mm bear a fall, so that seams stay closed where the kit is \
-                     {done}; --thickness {from_mm:.1} leaves that out"
+                    "walls are {to_mm:.1} mm thick where {from_mm:.1} mm bear a fall, so that seams stay \
+                     closed where the kit is {done}; --thickness {from_mm:.1} leaves that out"
                 ),
             ),
             // The user's labels and the division
             Cause::LabelSplit { label, area_mm2 } => note(
                 "label-split",
-                format!("label {label} has parts that do not touch: {area_mm2:.0} mm² become a piece of their own"),
+                format!(
+                    "label {label} has parts that do not touch: {area_mm2:.0} mm² become a piece of their \
+                     own"
+                ),
             ),
             Cause::LabelIslands {
                 n: 1,
@@ -130,7 +134,9 @@ impl Warning {
                 ..
             } => note(
                 "label-island",
-                format!("{largest_mm2:.1} mm² of label {largest_label} lie apart and join the piece around them"),
+                format!(
+                    "{largest_mm2:.1} mm² of label {largest_label} lie apart and join the piece around them"
+                ),
             ),
             Cause::LabelIslands {
                 n,
@@ -140,8 +146,8 @@ impl Warning {
             } => note(
                 "label-island",
                 format!(
-                    "{n} islands of labels, {area_mm2:.1} mm² in all, lie apart and join the pieces around them; the largest \
-                     has {largest_mm2:.1} mm² of label {largest_label}"
+                    "{n} islands of labels, {area_mm2:.1} mm² in all, lie apart and join the pieces around \
+                     them; the largest has {largest_mm2:.1} mm² of label {largest_label}"
                 ),
             ),
             Cause::LabelMerged {
@@ -152,18 +158,20 @@ impl Warning {
             } => warning(
                 "label-merged",
                 format!(
-                    "label {label} has only {area_mm2:.1} mm² in {n_triangles} triangles and joins its neighbour; pieces need \
-                     {least_mm2} mm²"
+                    "label {label} has only {area_mm2:.1} mm² in {n_triangles} triangles and joins its \
+                     neighbour; pieces need {least_mm2} mm²"
                 ),
             ),
             Cause::LabelsDivided { into } => {
-                let line =
-                    |(label, pieces): &(i64, Vec<PatchId>)| format!("label {label} into {}", in_words(pieces));
+                let line = |(label, pieces): &(i64, Vec<PatchId>)| {
+                    format!("label {label} into {}", in_words(pieces))
+                };
                 let all: Vec<String> = into.iter().map(line).collect();
                 warning(
                     "piece-split",
                     format!(
-                        "divided so that it locks and can be put on: {}; no piece may hold others alone, or run around a limb",
+                        "divided so that it locks and can be put on: {}; no piece may hold others alone, or \
+                         run around a limb",
                         all.join(", ")
                     ),
                 )
@@ -173,7 +181,8 @@ impl Warning {
                 warning(
                     "piece-joined",
                     format!(
-                        "labels {} are one piece, {}: the seams between or around them are too short to hold two pieces",
+                        "labels {} are one piece, {}: the seams between or around them are too short to \
+                         hold two pieces",
                         labels.join(", "),
                         self.ids()
                     ),
@@ -182,30 +191,31 @@ impl Warning {
             Cause::ShortContacts { from_mm, to_mm } => warning(
                 "short-contacts",
                 format!(
-                    "{} hold by seams of {from_mm:.0} to {to_mm:.0} mm, so their joints are short; a larger size or smaller \
-                     connectors make them firmer",
+                    "{} hold by seams of {from_mm:.0} to {to_mm:.0} mm, so their joints are short; a larger \
+                     size or smaller connectors make them firmer",
                     in_words(&self.pieces)
                 ),
             ),
             Cause::WeakGraph => warning(
                 "weak-graph",
                 format!(
-                    "{} alone hold{} others, which may come loose: give other labels, smaller connectors or a larger size",
+                    "{} alone hold{} others, which may come loose: give other labels, smaller connectors or \
+                     a larger size",
                     in_words(&self.pieces),
                     if self.pieces.len() == 1 { "s" } else { "" }
                 ),
             ),
             Cause::DividedOtherwise => warning(
                 "divided-otherwise",
-                "pieces are of similar size and seams may run through a face, as none cut where a person would cut hold together; \
-                 try your own labels, or another number of pieces (--pieces)"
+                "pieces are of similar size and seams may run through a face, as none cut where a person \
+                 would cut hold together; try your own labels, or another number of pieces (--pieces)"
                     .to_owned(),
             ),
             Cause::KeepWholeCut { share } => warning(
                 "keep-whole-cut",
                 format!(
-                    "a region to keep whole is divided: {:.0} % of it is in one piece ({}); give a smaller region, or one that \
-                     ends in creases",
+                    "a region to keep whole is divided: {:.0} % of it is in one piece ({}); give a smaller \
+                     region, or one that ends in creases",
                     100.0 * share,
                     in_words(&self.pieces)
                 ),
@@ -219,8 +229,8 @@ impl Warning {
             } => warning(
                 "key-not-flat",
                 format!(
-                    "the key, piece {first}, is curved and may sit loosely: {:.0} % of it lies in a plane, {:.0} % would do; give \
-                     it a flatter place{}",
+                    "the key, piece {first}, is curved and may sit loosely: {:.0} % of it lies in a plane, \
+                     {:.0} % would do; give it a flatter place{}",
                     100.0 * flat_share,
                     100.0 * least_share,
                     or_cut(*may_be_cut)
@@ -233,8 +243,8 @@ impl Warning {
             } => warning(
                 "key-not-straight",
                 format!(
-                    "friction alone holds the key, piece {first}: no side is straight along its way out for {least_mm:.0} mm \
-                     (longest: {straight_mm:.1}); draw straight seams there{}",
+                    "friction alone holds the key, piece {first}: no side is straight along its way out for \
+                     {least_mm:.0} mm (longest: {straight_mm:.1}); draw straight seams there{}",
                     or_cut(*may_be_cut)
                 ),
             ),
@@ -252,27 +262,30 @@ impl Warning {
             Cause::TimeUp { kits } => warning(
                 "time-up",
                 format!(
-                    "the time was over (--time) after {kits} {}, of which this is the best; with more time it may be another",
+                    "the time was over (--time) after {kits} {}, of which this is the best; with more time \
+                     it may be another",
                     if *kits == 1 { "kit" } else { "kits" }
                 ),
             ),
             Cause::KeyWithoutRails => note(
                 "key-without-rails",
                 format!(
-                    "the key, piece {first}, has no rails, as nothing straight runs under its sides; its other connectors hold it"
+                    "the key, piece {first}, has no rails, as nothing straight runs under its sides; its \
+                     other connectors hold it"
                 ),
             ),
             Cause::KeyWithoutRibs => warning(
                 "key-without-ribs",
                 format!(
-                    "nothing but tight walls keeps the key, piece {first}, in: it has no rails, and no side for ribs; a drop of \
-                     removable glue holds it"
+                    "nothing but tight walls keeps the key, piece {first}, in: it has no rails, and no side \
+                     for ribs; a drop of removable glue holds it"
                 ),
             ),
             Cause::KeyWithoutGrip => note(
                 "key-without-grip",
                 format!(
-                    "piece {first} has no notch to pull it out by: it has no even place of 12 × 3 mm in its middle"
+                    "piece {first} has no notch to pull it out by: it has no even place of 12 × 3 mm in its \
+                     middle"
                 ),
             ),
             Cause::KeyRibs {
@@ -282,8 +295,8 @@ impl Warning {
             } => note(
                 "key-ribs",
                 format!(
-                    "{n} ribs on the key press by {interference_mm:.2} mm on the last {travel_mm:.1} mm of its way, on purpose, so \
-                     that it stays in; file them down if it is too tight"
+                    "{n} ribs on the key press by {interference_mm:.2} mm on the last {travel_mm:.1} mm of \
+                     its way, on purpose, so that it stays in; file them down if it is too tight"
                 ),
             ),
             Cause::Detent {
@@ -292,28 +305,31 @@ impl Warning {
             } => note(
                 "detent",
                 format!(
-                    "the key clicks past a bump of piece {first} on its last {travel_mm:.1} mm, {interference_mm:.2} mm too high for \
-                     its groove on purpose"
+                    "the key clicks past a bump of piece {first} on its last {travel_mm:.1} mm, \
+                     {interference_mm:.2} mm too high for its groove on purpose"
                 ),
             ),
             // The plan
             Cause::ShortJoints { from_mm } => warning(
                 "short-joints",
                 format!(
-                    "joints from {from_mm:.1} mm on hold pieces, as none lock by longer ones alone; a larger size makes them firmer"
+                    "joints from {from_mm:.1} mm on hold pieces, as none lock by longer ones alone; a \
+                     larger size makes them firmer"
                 ),
             ),
             Cause::OcclusionToleranceRaised { share } => warning(
                 "occlusion-tolerance-raised",
                 format!(
-                    "no plan leaves all ways free: up to {} % of a piece is carved away where it passes another",
+                    "no plan leaves all ways free: up to {} % of a piece is carved away where it passes \
+                     another",
                     100.0 * share
                 ),
             ),
             Cause::ComesApart => warning(
                 "comes-apart",
                 format!(
-                    "without friction {} can be pulled apart, by simulation; make other pieces (--pieces) or larger connectors",
+                    "without friction {} can be pulled apart, by simulation; make other pieces (--pieces) \
+                     or larger connectors",
                     in_words(&self.pieces)
                 ),
             ),
@@ -325,27 +341,29 @@ impl Warning {
             } => warning(
                 "bears-little",
                 format!(
-                    "{done} it bears {bears}, not {asked}: then {gives_way} between pieces {first} and {second}; handle it with care \
-                     there, print it larger, or choose fewer pieces (--pieces)"
+                    "{done} it bears {bears}, not {asked}: then {gives_way} between pieces {first} and \
+                     {second}; handle it with care there, print it larger, or choose fewer pieces (--pieces)"
                 ),
             ),
             Cause::ConnectorsForUse { from_mm, to_mm, done } => note(
                 "connectors-for-use",
                 format!(
-                    "connectors between pieces {first} and {second} are {to_mm:.1} mm instead of {from_mm:.1} mm, so that their seam \
-                     stays closed where the kit is {done}"
+                    "connectors between pieces {first} and {second} are {to_mm:.1} mm instead of \
+                     {from_mm:.1} mm, so that their seam stays closed where the kit is {done}"
                 ),
             ),
             Cause::JoinedForUse { done } => note(
                 "joined-for-use",
                 format!(
-                    "two pieces are one here, since the seam between them would give way where the kit is {done}"
+                    "two pieces are one here, since the seam between them would give way where the kit is \
+                     {done}"
                 ),
             ),
             Cause::PieceLoose => warning(
                 "piece-loose",
                 format!(
-                    "some push moves piece {first} and hardly any connector stops it; make more pieces, or divide the model otherwise"
+                    "some push moves piece {first} and hardly any connector stops it; make more pieces, or \
+                     divide the model otherwise"
                 ),
             ),
             // The bodies and their connectors
@@ -365,38 +383,43 @@ impl Warning {
                 note(
                     "connector-limited",
                     format!(
-                        "connectors between pieces {a} and {b} are {given_mm:.1} mm where {wanted_mm:.1} mm would bear more, because \
-                         {why}{others}; {remedy}"
+                        "connectors between pieces {a} and {b} are {given_mm:.1} mm where {wanted_mm:.1} mm \
+                         would bear more, because {why}{others}; {remedy}"
                     ),
                 )
             }
             Cause::BodyInParts { dropped_mm3 } => warning(
                 "body-in-parts",
                 format!(
-                    "piece {first} lacks {dropped_mm3:.1} mm³ that hung on nothing and were dropped: fill the gap, or divide the \
-                     model otherwise there"
+                    "piece {first} lacks {dropped_mm3:.1} mm³ that hung on nothing and were dropped: fill \
+                     the gap, or divide the model otherwise there"
                 ),
             ),
             Cause::PartGiven { given_mm3 } => {
-                let to = self.pieces.get(1).map_or_else(String::new, |to| format!(" and went to piece {to}"));
+                let to = self
+                    .pieces
+                    .get(1)
+                    .map_or_else(String::new, |to| format!(" and went to piece {to}"));
                 warning(
                     "part-given",
                     format!(
-                        "{given_mm3:.0} mm³ of piece {first} came off it where seams meet{to}, though colours show it as piece {first}'s; \
-                         see that they fit there"
+                        "{given_mm3:.0} mm³ of piece {first} came off it where seams meet{to}, though \
+                         colours show it as piece {first}'s; see that they fit there"
                     ),
                 )
             }
             Cause::SeamWithoutConnector { length_mm } => note(
                 "seam-without-connector",
                 format!(
-                    "the seam of {length_mm:.0} mm between pieces {first} and {second} has no connector; other seams hold these pieces"
+                    "the seam of {length_mm:.0} mm between pieces {first} and {second} has no connector; \
+                     other seams hold these pieces"
                 ),
             ),
             Cause::PieceWithoutNumber => note(
                 "piece-without-number",
                 format!(
-                    "no number is engraved on {}, which {} no even place for it inside; tell {} by the pictures",
+                    "no number is engraved on {}, which {} no even place for it inside; tell {} by the \
+                     pictures",
                     in_words(&self.pieces),
                     if self.pieces.len() == 1 { "has" } else { "have" },
                     if self.pieces.len() == 1 { "it" } else { "them" },
@@ -406,13 +429,15 @@ impl Warning {
             Cause::SmallOverlap { volume_mm3 } => warning(
                 "small-overlap",
                 format!(
-                    "pieces {first} and {second} overlap by {volume_mm3:.3} mm³; sand the joint if it is tight"
+                    "pieces {first} and {second} overlap by {volume_mm3:.3} mm³; sand the joint if it is \
+                     tight"
                 ),
             ),
             Cause::SurfacesCross { by_mm, after_mm } => warning(
                 "surfaces-cross",
                 format!(
-                    "piece {first} rubs on piece {second} by {by_mm:.2} mm, {after_mm:.1} mm before it sits: sand it a little there"
+                    "piece {first} rubs on piece {second} by {by_mm:.2} mm, {after_mm:.1} mm before it \
+                     sits: sand it a little there"
                 ),
             ),
             Cause::ThinPlaces {
@@ -424,7 +449,8 @@ impl Warning {
             } => warning(
                 "thin-places",
                 format!(
-                    "{} {} {}; the longest is {longest_mm:.0} mm long and {thickness_mm:.2} mm {}; look there before you assemble",
+                    "{} {} {}; the longest is {longest_mm:.0} mm long and {thickness_mm:.2} mm {}; look \
+                     there before you assemble",
                     in_words(&self.pieces),
                     if self.pieces.len() == 1 { "has" } else { "have" },
                     thin_places(*n_sheets, *n_slots),
@@ -434,10 +460,14 @@ impl Warning {
             Cause::Rattles { loosest } => warning(
                 "rattles",
                 format!(
-                    "{} {}, by up to {:.1} mm and {:.1}°, and {} in place; a smaller clearance, fewer pieces or a larger size make \
-                     {} firmer",
+                    "{} {}, by up to {:.1} mm and {:.1}°, and {} in place; a smaller clearance, fewer \
+                     pieces or a larger size make {} firmer",
                     in_words(&self.pieces),
-                    if self.pieces.len() == 1 { "rattles" } else { "rattle" },
+                    if self.pieces.len() == 1 {
+                        "rattles"
+                    } else {
+                        "rattle"
+                    },
                     loosest.translation_mm,
                     loosest.rotation_deg,
                     if self.pieces.len() == 1 { "stays" } else { "stay" },
@@ -452,8 +482,8 @@ impl Warning {
                 problem(
                     "piece-too-large",
                     format!(
-                        "{} {does} not fit the printer {printer} and {} left out of plates.3mf: choose more pieces (--pieces) or \
-                         another printer",
+                        "{} {does} not fit the printer {printer} and {} left out of plates.3mf: choose more \
+                         pieces (--pieces) or another printer",
                         in_words(&self.pieces),
                         if self.pieces.len() == 1 { "is" } else { "are" },
                     ),

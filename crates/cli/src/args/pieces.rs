@@ -64,7 +64,9 @@ impl FromStr for Key {
             number => {
                 let piece = number.parse().ok().map(Self::Piece);
                 piece.or_else(|| place(number).map(Self::Near)).ok_or_else(|| {
-                    "give auto, piece, the number of a piece (its label, where there are labels), or a place X,Y,Z in mm".to_owned()
+                    "give auto, piece, the number of a piece (its label, where there are labels), or a place \
+                     X,Y,Z in mm"
+                        .to_owned()
                 })
             }
         }

@@ -190,7 +190,8 @@ impl Run {
                     record.said.extend(ended.last_words);
                 }
                 if record.status == Status::Crashed && ended.code.is_none() {
-                    let killed = "it was killed, as systems do where memory runs out: fewer at a time (--jobs, --memory)";
+                    let killed = "it was killed, as systems do where memory runs out: fewer at a time \
+                                  (--jobs, --memory)";
                     record.said.push(killed.to_owned());
                 }
             }

@@ -11,10 +11,13 @@ pub const TABLE: &str = "batch.csv";
 /// Name of the table for people, with pictures.
 pub const PAGE: &str = "batch.html";
 
-const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;margin:24px;color:#26242b;background:#f8f7f5}\
-table{border-collapse:collapse;background:#fff}td,th{padding:6px 10px;border-bottom:1px solid #e3e0dc;text-align:left;vertical-align:top}\
-td.n{text-align:right;font-variant-numeric:tabular-nums}img{width:240px;display:block}.verified{color:#1d7a46}.failed,.no-plan,.too-long,.crashed{color:#c0322b}\
-.refused{color:#8a5a06}small{color:#68646f}@media(prefers-color-scheme:dark){body{background:#1d1c21;color:#ecebf0}table{background:#27262c}td,th{border-color:#3a3841}}";
+const STYLE: &str = "body{font:15px/1.45 \
+     system-ui,sans-serif;margin:24px;color:#26242b;background:#f8f7f5}table{border-collapse:collapse;\
+     background:#fff}td,th{padding:6px 10px;border-bottom:1px solid \
+     #e3e0dc;text-align:left;vertical-align:top}td.n{text-align:right;font-variant-numeric:\
+     tabular-nums}img{width:240px;display:block}.verified{color:#1d7a46}.failed,.no-plan,.too-long,.\
+     crashed{color:#c0322b}.refused{color:#8a5a06}small{color:#68646f}@media(prefers-color-scheme:\
+     dark){body{background:#1d1c21;color:#ecebf0}table{background:#27262c}td,th{border-color:#3a3841}}";
 
 /// Builds both tables, each with its file name.
 pub fn files(records: &[Record]) -> Vec<(String, Vec<u8>)> {
@@ -69,8 +72,9 @@ fn html(records: &[Record]) -> String {
         let said: Vec<String> = r.said.iter().take(3).map(|said| escaped(said)).collect();
         let _ = write!(
             rows,
-            "<tr><td>{picture}</td><td>{}</td><td class=\"{s}\">{s}</td><td class=\"n\">{}</td><td class=\"n\">{:.0}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td><td><small>{}</small></td></tr>",
+            "<tr><td>{picture}</td><td>{}</td><td class=\"{s}\">{s}</td><td class=\"n\">{}</td><td \
+             class=\"n\">{:.0}</td><td class=\"n\">{}</td><td \
+             class=\"n\">{}</td><td><small>{}</small></td></tr>",
             escaped(&r.model),
             r.pieces.map_or(String::new(), |n| n.to_string()),
             r.seconds,
@@ -82,9 +86,11 @@ fn html(records: &[Record]) -> String {
     }
     let n_verified = records.iter().filter(|r| r.status == Status::Verified).count();
     format!(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>Kits</title><style>{STYLE}</style>\
-         <h1>{n_verified} of {} models have a kit that passes every check</h1><table><thead><tr><th>Kit<th>Model<th>Status<th>Pieces<th>Seconds<th>Memory, MB<th>Warnings<th>Said first\
-         </thead><tbody>{rows}</tbody></table></html>\n",
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" \
+         content=\"width=device-width\"><title>Kits</title><style>{STYLE}</style><h1>{n_verified} of {} \
+         models have a kit that passes every \
+         check</h1><table><thead><tr><th>Kit<th>Model<th>Status<th>Pieces<th>Seconds<th>Memory, \
+         MB<th>Warnings<th>Said first</thead><tbody>{rows}</tbody></table></html>\n",
         records.len()
     )
 }

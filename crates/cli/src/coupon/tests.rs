@@ -41,8 +41,8 @@ fn every_number_saved_gives_back_its_clearances_and_all_else_of_the_printer_it_i
 
 #[test]
 fn comments_and_all_that_is_not_a_clearance_stay_as_they_are() {
-    let text = "# mine\nsize = 180 # mm\n\n[printers.workshop] # upstairs\nlike = \"fdm\"\nbed = [300, 300, 340]\n\
-                clearance = 0.18 # measured\nwall-gap = 0.07\n\n[printers.other]\nprocess = \"sls\"\n";
+    let text = "# mine\nsize = 180 # mm\n\n[printers.workshop] # upstairs\nlike = \"fdm\"\nbed = [300, 300, \
+                340]\nclearance = 0.18 # measured\nwall-gap = 0.07\n\n[printers.other]\nprocess = \"sls\"\n";
     let base = own(text, "workshop");
     let [.., loosest] = five(&base);
     let saved = with_printer(text, &base, &loosest, "workshop").unwrap();

@@ -88,12 +88,16 @@ fn is_normalised(format: Format, longest: f64) -> bool {
 /// Warns of a size that the file states but that few people intend.
 fn unusual(longest_mm: f64) -> Option<Warning> {
     (!is_usual(longest_mm)).then(|| {
-        let how = if longest_mm > *USUAL_MM.end() { "large" } else { "small" };
+        let how = if longest_mm > *USUAL_MM.end() {
+            "large"
+        } else {
+            "small"
+        };
         warning(
             "size-unusual",
             format!(
-                "the file states its unit, by which the longest side is {longest_mm:.1} mm: unusually {how}; it is made so \
-                 (choose another with --size)"
+                "the file states its unit, by which the longest side is {longest_mm:.1} mm: unusually \
+                 {how}; it is made so (choose another with --size)"
             ),
         )
     })
@@ -103,7 +107,8 @@ fn unusual(longest_mm: f64) -> Option<Warning> {
 fn guess(loaded: &Loaded, longest: f64) -> Warning {
     let what = match loaded.unit_mm {
         Some(mm) if is_normalised(loaded.format, longest) => format!(
-            "the longest side is {longest:.3} of the file's units of {mm} mm, as of models that programs scale to one size"
+            "the longest side is {longest:.3} of the file's units of {mm} mm, as of models that programs \
+             scale to one size"
         ),
         Some(mm) => format!(
             "by the file's unit the longest side is {} mm, which is unusual",
@@ -140,7 +145,8 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
     warning(
         "size-guessed",
         format!(
-            "{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or --scale)"
+            "{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or \
+             --scale)"
         ),
     )
 }

@@ -20,13 +20,15 @@ pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
             least_mm2,
             ..
         } => format!(
-            "piece {label} is too small ({area_mm2:.0} mm², at least {least_mm2} are needed) and will join its neighbour"
+            "piece {label} is too small ({area_mm2:.0} mm², at least {least_mm2} are needed) and will join \
+             its neighbour"
         ),
         Cause::LabelsDivided { into } => {
             let line = |(label, pieces): &(i64, Vec<PatchId>)| format!("piece {label} in {}", pieces.len());
             let all: Vec<String> = into.iter().map(line).collect();
             format!(
-                "will be divided so that it locks and can be put on: {}; no piece may hold others alone, or run around a limb",
+                "will be divided so that it locks and can be put on: {}; no piece may hold others alone, or \
+                 run around a limb",
                 all.join(", ")
             )
         }

@@ -162,7 +162,8 @@ impl View<'_> {
                         let (piece, by, share) = (number(b.piece), number(b.by), 100.0 * b.occluded);
                         let place = self.standing.words(b.at);
                         let words = format!(
-                            "piece {by} is in the way of piece {piece} ({place}): it hides {share:.0} % of it"
+                            "piece {by} is in the way of piece {piece} ({place}): it hides {share:.0} % of \
+                             it"
                         );
                         json!({ "piece": piece, "by": by, "words": words, "at": self.at(b.at) })
                     })

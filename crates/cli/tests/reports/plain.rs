@@ -18,8 +18,9 @@ fn color(p: Vec3) -> [u8; 3] {
 fn coloured_ply() -> Vec<u8> {
     let mesh = body();
     let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
-         property uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float \
+         z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face {}\nproperty list \
+         uchar int vertex_indices\nend_header\n",
         mesh.points.len(),
         mesh.triangles.len()
     );

@@ -30,7 +30,8 @@ fn package(parts: &[(&str, &str)]) -> Vec<u8> {
 /// Writes a model part; `attributes` are those of its root element.
 fn model(attributes: &str, resources: &str, build: &str) -> String {
     format!(
-        "<model {attributes} xmlns=\"{MICROSOFT}/core/2015/02\"><resources>{resources}</resources><build>{build}</build></model>"
+        "<model {attributes} \
+         xmlns=\"{MICROSOFT}/core/2015/02\"><resources>{resources}</resources><build>{build}</build></model>"
     )
 }
 
@@ -102,8 +103,9 @@ fn negative() -> Vec<Case> {
     let [a, b] = two();
     let n = a.triangles.len();
     let range = format!(
-        "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"{}\"/><volume firstid=\"{n}\" lastid=\"9999\"><metadata \
-         type=\"volume\" key=\"volume_type\" value=\"NegativeVolume\"/></volume></object></config>",
+        "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"{}\"/><volume firstid=\"{n}\" \
+         lastid=\"9999\"><metadata type=\"volume\" key=\"volume_type\" \
+         value=\"NegativeVolume\"/></volume></object></config>",
         n - 1
     );
     let joined = object(1, "", &mesh(&both([a.clone(), b.clone()]), ""));
@@ -114,7 +116,8 @@ fn negative() -> Vec<Case> {
             "",
             "<components><component objectid=\"1\"/><component objectid=\"2\"/></components>",
         );
-    let part = "<config><object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/><part id=\"2\" subtype=\"negative_part\"/></object></config>";
+    let part = "<config><object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/><part id=\"2\" \
+                subtype=\"negative_part\"/></object></config>";
     let open = object(2, "", &mesh(&b, "")).replacen("<triangle v1=\"0\"", "<triangle v1=\"1\"", 1);
     let broken = object(1, "", &mesh(&a, ""))
         + &open
@@ -150,7 +153,8 @@ fn told() -> Vec<Case> {
         "</mesh>",
         "<x:vertices><vertex x=\"99\" y=\"0\" z=\"0\"/></x:vertices></mesh>",
     );
-    let build = "<item objectid=\"1\" x:transform=\"2 0 0 0 2 0 0 0 2 0 0 0\"/><x:alt><x:item objectid=\"7\"/></x:alt>";
+    let build = "<item objectid=\"1\" x:transform=\"2 0 0 0 2 0 0 0 2 0 0 0\"/><x:alt><x:item \
+                 objectid=\"7\"/></x:alt>";
     let parts = part.clone()
         + &object(2, "", &mesh(&b, ""))
         + &object(
@@ -199,8 +203,8 @@ fn marks() -> Vec<Case> {
     };
     let group =
         |mark: &str| format!("<metadatagroup><metadata name=\"cura:{mark}\">True</metadata></metadatagroup>");
-    let modifier = "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"511\"/><volume firstid=\"512\" lastid=\"9999\"><metadata \
-                    key=\"modifier\" value=\"1\"/></volume></object></config>";
+    let modifier = "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"511\"/><volume firstid=\"512\" \
+                    lastid=\"9999\"><metadata key=\"modifier\" value=\"1\"/></volume></object></config>";
     let joined = object(1, "", &mesh(&both([a.clone(), b.clone()]), ""));
     vec![
         marked("cura_support.3mf", &group("support_mesh"), "").proves(
@@ -212,7 +216,8 @@ fn marks() -> Vec<Case> {
         marked("cura_cutting.3mf", &group("cutting_mesh"), ""),
         marked(
             "cura_older.3mf",
-            "<settings xmlns=\"http://software.ultimaker.com/xml/cura/3mf/2015/10\"><setting key=\"anti_overhang_mesh\">true</setting></settings>",
+            "<settings xmlns=\"http://software.ultimaker.com/xml/cura/3mf/2015/10\"><setting \
+             key=\"anti_overhang_mesh\">true</setting></settings>",
             "",
         ),
         Case::new("modifier_of_old.3mf", with(PRUSA, modifier, &joined, ITEM))
@@ -268,8 +273,8 @@ fn extensions() -> Vec<Case> {
     ) + &object(2, "", &mesh(&body(), ""));
     let displaced = object(1, "", "<d:displacementmesh/>");
     let level = object(1, "", "<v:levelset functionid=\"3\"/>");
-    let sets = "<t:trianglesets><t:triangleset name=\"lower\"><t:refrange startindex=\"0\" endindex=\"255\"/></t:triangleset>\
-                </t:trianglesets>";
+    let sets = "<t:trianglesets><t:triangleset name=\"lower\"><t:refrange startindex=\"0\" \
+                endindex=\"255\"/></t:triangleset></t:trianglesets>";
     vec![
         Case::new(
             "beams.3mf",
@@ -322,7 +327,8 @@ fn shared() -> Vec<Case> {
         &(object(1, "", &mesh(&a, "")) + &object(2, "", &mesh(&b, ""))),
         "",
     );
-    let blocked = "<config><object id=\"4\"><part id=\"1\"/><part id=\"2\" subtype=\"support_blocker\"/></object></config>";
+    let blocked = "<config><object id=\"4\"><part id=\"1\"/><part id=\"2\" \
+                   subtype=\"support_blocker\"/></object></config>";
     let lost = package(&[(ROOT, &root), ("3D/o.model", &other), (BAMBU, blocked)]);
     let single = format!("<components>{}</components>", component(1));
     let two_roles = model(
@@ -330,8 +336,8 @@ fn shared() -> Vec<Case> {
         &(object(3, "", &single) + &object(4, "", &single)),
         "<item objectid=\"3\"/><item objectid=\"4\" transform=\"1 0 0 0 1 0 0 0 1 90 0 0\"/>",
     );
-    let modifier = "<config><object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/></object><object id=\"4\"><part id=\"1\" \
-                    subtype=\"modifier_part\"/></object></config>";
+    let modifier = "<config><object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/></object><object \
+                    id=\"4\"><part id=\"1\" subtype=\"modifier_part\"/></object></config>";
     let from = |path: &str| {
         format!("<components><component p:path=\"/3D/{path}.model\" objectid=\"1\"/></components>")
     };
@@ -341,8 +347,9 @@ fn shared() -> Vec<Case> {
         "<item objectid=\"3\"/><item objectid=\"4\"/>",
     );
     let second = model("", &object(1, "", &mesh(&b, "")), "");
-    let filaments = "<config><object id=\"3\"><part id=\"1\"><metadata key=\"extruder\" value=\"1\"/></part></object><object id=\"4\">\
-                     <part id=\"1\"><metadata key=\"extruder\" value=\"2\"/></part></object></config>";
+    let filaments = "<config><object id=\"3\"><part id=\"1\"><metadata key=\"extruder\" \
+                     value=\"1\"/></part></object><object id=\"4\"><part id=\"1\"><metadata \
+                     key=\"extruder\" value=\"2\"/></part></object></config>";
     vec![
         Case::new("shared_part.3mf", lost).says(&[Size([70.0, 40.0, 30.0]), Note("not to print")]),
         Case::new(
@@ -372,13 +379,15 @@ fn packages() -> Vec<Case> {
         &object(
             5,
             "",
-            "<components><component p:path=\"/3D/3dmodel.model\" objectid=\"1\" transform=\"2 0 0 0 2 0 0 0 2 0 0 0\"/></components>",
+            "<components><component p:path=\"/3D/3dmodel.model\" objectid=\"1\" transform=\"2 0 0 0 2 0 0 0 \
+             2 0 0 0\"/></components>",
         ),
         "<item objectid=\"5\"/>",
     );
     let relations = |target: &str| {
         format!(
-            "<Relationships><Relationship Target=\"{target}\" Type=\"{MICROSOFT}/2013/01/3dmodel\"/></Relationships>"
+            "<Relationships><Relationship Target=\"{target}\" \
+             Type=\"{MICROSOFT}/2013/01/3dmodel\"/></Relationships>"
         )
     };
     let twice = Size([120.0, 80.0, 60.0]);
@@ -450,8 +459,8 @@ fn plates() -> Vec<Case> {
     };
     let plate = |id: u32| {
         format!(
-            "<plate><metadata key=\"plater_id\" value=\"{id}\"/><model_instance><metadata key=\"object_id\" value=\"{id}\"/>\
-             <metadata key=\"instance_id\" value=\"0\"/></model_instance></plate>"
+            "<plate><metadata key=\"plater_id\" value=\"{id}\"/><model_instance><metadata key=\"object_id\" \
+             value=\"{id}\"/><metadata key=\"instance_id\" value=\"0\"/></model_instance></plate>"
         )
     };
     let settings = format!(
@@ -478,13 +487,15 @@ fn plates() -> Vec<Case> {
     );
     let pair = with(
         BAMBU,
-        "<config><object id=\"4\"><metadata key=\"name\" value=\"thing\"/><part id=\"1\"><metadata key=\"name\" value=\"Body\"/></part>\
-         <part id=\"2\"><metadata key=\"name\" value=\"Base\"/></part></object></config>",
+        "<config><object id=\"4\"><metadata key=\"name\" value=\"thing\"/><part id=\"1\"><metadata \
+         key=\"name\" value=\"Body\"/></part><part id=\"2\"><metadata key=\"name\" \
+         value=\"Base\"/></part></object></config>",
         &(resources.clone()
             + &object(
                 4,
                 "",
-                "<components><component objectid=\"1\"/><component objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 90 0 0\"/></components>",
+                "<components><component objectid=\"1\"/><component objectid=\"2\" transform=\"1 0 0 0 1 0 0 \
+                 0 1 90 0 0\"/></components>",
             )),
         "<item objectid=\"4\"/>",
     );
@@ -530,7 +541,8 @@ fn sizes() -> Vec<Case> {
         package(&[(ROOT, &model(attributes, &resources, ITEM))])
     };
     let far = both([body(), moved(&body(), Vec3::X * 3000.0)]);
-    let modifier = "<config><object id=\"1\"><volume firstid=\"512\" lastid=\"9999\"><metadata type=\"volume\" key=\"volume_type\" \
+    let modifier = "<config><object id=\"1\"><volume firstid=\"512\" lastid=\"9999\"><metadata \
+                    type=\"volume\" key=\"volume_type\" \
                     value=\"ParameterModifier\"/></volume></object></config>";
     vec![
         Case::new("life_size.3mf", of("unit=\"millimeter\"", 20.0))

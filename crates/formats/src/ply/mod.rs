@@ -221,8 +221,8 @@ fn label_note(name: &str, labels: Option<&[i64]>) -> Option<String> {
     let n_below = labels.iter().filter(|label| **label < 0).count();
     (n_below > 0).then(|| {
         format!(
-            "{n_below} of {} faces have a {name:?} below 0, as programs mark what has none; they are taken as a \
-             piece of their own, or one for each place",
+            "{n_below} of {} faces have a {name:?} below 0, as programs mark what has none; they are taken \
+             as a piece of their own, or one for each place",
             labels.len()
         )
     })
@@ -320,9 +320,9 @@ pub fn write_ply(mesh: &TriMesh, face_labels: Option<&[i32]>) -> Vec<u8> {
         ""
     };
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment written by shellock\n\
-         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         element face {}\nproperty list uchar uint vertex_indices\n{label_line}end_header\n",
+        "ply\nformat binary_little_endian 1.0\ncomment written by shellock\nelement vertex {}\nproperty \
+         double x\nproperty double y\nproperty double z\nelement face {}\nproperty list uchar uint \
+         vertex_indices\n{label_line}end_header\n",
         mesh.points.len(),
         mesh.triangles.len(),
     );

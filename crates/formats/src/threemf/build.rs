@@ -391,8 +391,8 @@ impl Flat {
         }
         if self.n_unnamed > 0 {
             notes.push(format!(
-                "{} triangle(s) have a colour or material that the file does not have; those of the same missing \
-                 one are taken as one",
+                "{} triangle(s) have a colour or material that the file does not have; those of the same \
+                 missing one are taken as one",
                 self.n_unnamed
             ));
         }

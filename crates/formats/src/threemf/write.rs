@@ -28,8 +28,8 @@ const TITLE: &str = "Shellock pieces";
 /// Namespace of PrusaSlicer's attributes.
 const PAINT_NAMESPACE: &str = r#" xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06""#;
 /// Versions of PrusaSlicer's additions and of the paint.
-const PAINT_VERSION: &str = "<metadata name=\"slic3rpe:Version3mf\">1</metadata>\n\
-                             <metadata name=\"slic3rpe:MmPaintingVersion\">1</metadata>\n";
+const PAINT_VERSION: &str = "<metadata name=\"slic3rpe:Version3mf\">1</metadata>\n<metadata \
+                             name=\"slic3rpe:MmPaintingVersion\">1</metadata>\n";
 const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>
 "#;

@@ -24,8 +24,8 @@ pub enum InputError {
     },
     /// Coordinates so large that no volume can be computed.
     #[error(
-        "{count} points lie farther than 1e30 from the origin, the first is point {vertex} (from 0); \
-         the file is damaged: export the model again"
+        "{count} points lie farther than 1e30 from the origin, the first is point {vertex} (from 0); the \
+         file is damaged: export the model again"
     )]
     TooFar {
         /// First point that is too far away.
@@ -91,8 +91,9 @@ pub enum InputError {
     },
     /// Surface broken by points that were rounded to the same place.
     #[error(
-        "{count} of {n_faces} triangles have no size, since their corners are in the same place; the coordinates were \
-         rounded too coarsely: move the model near the origin where it was made and export it with more digits"
+        "{count} of {n_faces} triangles have no size, since their corners are in the same place; the \
+         coordinates were rounded too coarsely: move the model near the origin where it was made and export \
+         it with more digits"
     )]
     Collapsed {
         /// Number of triangles with two equal corners.
@@ -150,7 +151,8 @@ pub enum InputError {
     },
     /// All triangles face inwards.
     #[error(
-        "the model is inside out: all its triangles face inwards; flip the normals (flip the faces) and export it again"
+        "the model is inside out: all its triangles face inwards; flip the normals (flip the faces) and \
+         export it again"
     )]
     InsideOut,
     /// Closed surface that encloses no volume.

@@ -46,9 +46,9 @@ fn bodies_are_counted_and_cavities_named() {
     let message = error(&cavity).to_string();
     assert_eq!(
         message,
-        "the model consists of 2 separate bodies: 12 triangles of 4 × 4 × 4 around (2, 2, 2), \
-         12 triangles of 1 × 1 × 1 around (1.5, 1.5, 1.5) (a cavity); \
-         keep one of them, or unite those that overlap into one"
+        "the model consists of 2 separate bodies: 12 triangles of 4 × 4 × 4 around (2, 2, 2), 12 triangles \
+         of 1 × 1 × 1 around (1.5, 1.5, 1.5) (a cavity); keep one of them, or unite those that overlap into \
+         one"
     );
 }
 

@@ -142,8 +142,8 @@ impl RepairKind {
             Self::United { before, after } => {
                 let (before, after) = (Short(before), Short(after));
                 format!(
-                    "the surface crossed itself in {subject}; overlapping parts were united, \
-                     and the enclosed volume went from {before} to {after}"
+                    "the surface crossed itself in {subject}; overlapping parts were united, and the \
+                     enclosed volume went from {before} to {after}"
                 )
             }
             Self::Fused => format!("{subject}, some of which touch with their faces, were united"),

@@ -14,7 +14,8 @@ pub enum PlanFileError {
     OtherFormat,
     /// The file was written in a later version of the format.
     #[error(
-        "it is of version {version}, and this program reads 1 to {}: use the program that made the kit, or a later one",
+        "it is of version {version}, and this program reads 1 to {}: use the program that made the kit, or \
+         a later one",
         super::VERSION
     )]
     Later {

@@ -177,7 +177,8 @@ fn fields_of_the_wrong_kind_are_named() {
         (
             "/press_fits/0/kind",
             json!("nail"),
-            "\"press_fits[0].kind\" is not what a plan has there: unknown variant `nail`, expected `detent` or `rib`",
+            "\"press_fits[0].kind\" is not what a plan has there: unknown variant `nail`, expected `detent` \
+             or `rib`",
         ),
     ] {
         assert_eq!(complaint(pointer, Some(wrong)), said);

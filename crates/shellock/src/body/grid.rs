@@ -49,17 +49,20 @@ pub enum GridError {
     TooFine(#[from] GridTooFine),
     /// The boolean library rejects the mesh.
     #[error(
-        "the model's surface touches itself in a way that cannot be cut: {0}; separate the touching parts or repair the mesh"
+        "the model's surface touches itself in a way that cannot be cut: {0}; separate the touching parts \
+         or repair the mesh"
     )]
     Surface(String),
     /// The inner side of the wall is not closed.
     #[error(
-        "inside and outside of the model cannot be told apart everywhere, so it cannot be hollowed out: its surface crosses itself; make its parts one solid (a boolean union) and try again"
+        "inside and outside of the model cannot be told apart everywhere, so it cannot be hollowed out: its \
+         surface crosses itself; make its parts one solid (a boolean union) and try again"
     )]
     NoInside,
     /// No part of the model is deeper than the wall is thick.
     #[error(
-        "the model has no cavity between two walls of {thickness_mm:.2} mm that the grid could resolve, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
+        "the model has no cavity between two walls of {thickness_mm:.2} mm that the grid could resolve, so \
+         there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
     )]
     NoCavity {
         /// Wall thickness asked for, mm.

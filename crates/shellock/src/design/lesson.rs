@@ -155,7 +155,8 @@ impl std::fmt::Display for Lesson {
                 ..
             } => write!(
                 f,
-                "piece {piece} would rub on piece {against} on its way in, {travel_mm:.1} mm before it sits, {thickness_mm:.2} mm deep"
+                "piece {piece} would rub on piece {against} on its way in, {travel_mm:.1} mm before it \
+                 sits, {thickness_mm:.2} mm deep"
             ),
             Self::Blocked { piece, kept, .. } => {
                 write!(

@@ -17,7 +17,8 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
             format!("pieces {}", alone.join(", "))
         };
         let reason = format!(
-            "{who} share no seam with the others that is long enough for a connector; merge them with a neighbour or choose smaller connectors"
+            "{who} share no seam with the others that is long enough for a connector; merge them with a \
+             neighbour or choose smaller connectors"
         );
         return Some(PlanOutcome::Infeasible {
             reason,
@@ -31,7 +32,8 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     }
     let names: Vec<String> = articulations.iter().map(PatchId::to_string).collect();
     let reason = format!(
-        "no plan locks, since all that joins some pieces to the others goes through piece {}; split it lengthwise",
+        "no plan locks, since all that joins some pieces to the others goes through piece {}; split it \
+         lengthwise",
         names.join(" or ")
     );
     Some(PlanOutcome::Infeasible {

@@ -10,7 +10,8 @@ pub enum SegmentationError {
     Cancelled(#[from] Cancelled),
     /// Number of labels differs from the number of triangles.
     #[error(
-        "there are {n_labels} labels for {n_faces} triangles: give one label for each triangle, in the order of the model file"
+        "there are {n_labels} labels for {n_faces} triangles: give one label for each triangle, in the \
+         order of the model file"
     )]
     LabelCount {
         /// Number of labels given.
@@ -20,7 +21,8 @@ pub enum SegmentationError {
     },
     /// Only one label, so there is nothing to take apart.
     #[error(
-        "all {n_faces} triangles have the label {label}: give at least two labels, or none for automatic patches"
+        "all {n_faces} triangles have the label {label}: give at least two labels, or none for automatic \
+         patches"
     )]
     OneLabel {
         /// Label of all triangles.
@@ -30,7 +32,8 @@ pub enum SegmentationError {
     },
     /// Labels that number triangles rather than patches.
     #[error(
-        "{n_faces} triangles have {n_labels} different labels: give patches of at least 3 triangles on average, at most 1000"
+        "{n_faces} triangles have {n_labels} different labels: give patches of at least 3 triangles on \
+         average, at most 1000"
     )]
     TooManyLabels {
         /// Number of different labels.
@@ -40,7 +43,8 @@ pub enum SegmentationError {
     },
     /// Fewer than two patches were left after merging small ones.
     #[error(
-        "after merging patches below {min_piece_mm2} mm² only one is left: lower min_piece_mm2 or scale the model up"
+        "after merging patches below {min_piece_mm2} mm² only one is left: lower min_piece_mm2 or scale the \
+         model up"
     )]
     AllTooSmall {
         /// Smallest area of a patch, mm².
@@ -48,7 +52,8 @@ pub enum SegmentationError {
     },
     /// A region to keep whole without any surface in it.
     #[error(
-        "keep-whole: {region} has nothing of the surface; the model reaches from {} to {} mm: name another place or a larger radius, or a label that the model has",
+        "keep-whole: {region} has nothing of the surface; the model reaches from {} to {} mm: name another \
+         place or a larger radius, or a label that the model has",
         point(min_mm),
         point(max_mm)
     )]
@@ -86,7 +91,8 @@ pub enum SegmentationError {
     },
     /// A patch smaller than the mesh can represent, even unsmoothed.
     #[error(
-        "patch {patch} of {area_mm2:.1} mm² vanishes when seams are smoothed: merge it with a neighbour or raise min_piece_mm2"
+        "patch {patch} of {area_mm2:.1} mm² vanishes when seams are smoothed: merge it with a neighbour or \
+         raise min_piece_mm2"
     )]
     PatchVanished {
         /// Patch that would vanish.

@@ -169,7 +169,8 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
             strength.thickness_mm
         ),
         format!(
-            "Largest stress of all falls along the seams; connectors {least:.1} to {most:.1} mm, drawn as thick"
+            "Largest stress of all falls along the seams; connectors {least:.1} to {most:.1} mm, drawn as \
+             thick"
         ),
     ];
     for (row, title) in rows.iter().enumerate() {
@@ -178,7 +179,8 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
         for (column, picture) in pictures[2 * row..2 * row + 2].iter().enumerate() {
             let _ = writeln!(
                 svg,
-                "<image x=\"{}\" y=\"{}\" width=\"{view}\" height=\"{view}\" href=\"data:image/png;base64,{}\"/>",
+                "<image x=\"{}\" y=\"{}\" width=\"{view}\" height=\"{view}\" \
+                 href=\"data:image/png;base64,{}\"/>",
                 column as f64 * view,
                 top + 44.0,
                 STANDARD.encode(picture)

@@ -133,8 +133,9 @@ fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
     // Writing to a string cannot fail.
     let _ = writeln!(
         svg,
-        "<rect x=\"{left}\" y=\"{y:.1}\" width=\"{length:.1}\" height=\"{thick:.1}\" fill=\"{}\"/>\n\
-         <line x1=\"{at:.1}\" y1=\"{y:.1}\" x2=\"{at:.1}\" y2=\"{bottom:.1}\" stroke=\"black\" stroke-width=\"2\"/>",
+        "<rect x=\"{left}\" y=\"{y:.1}\" width=\"{length:.1}\" height=\"{thick:.1}\" fill=\"{}\"/>\n<line \
+         x1=\"{at:.1}\" y1=\"{y:.1}\" x2=\"{at:.1}\" y2=\"{bottom:.1}\" stroke=\"black\" \
+         stroke-width=\"2\"/>",
         row.color
     );
     // The figure stands behind the bar, and behind the limit where that would cross it.

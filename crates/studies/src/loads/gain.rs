@@ -221,7 +221,8 @@ fn openings(
         ("climbed", rated(best)?),
     ];
     Ok(format!(
-        "{} random plans with the climbed plan's key, {} pieces.\n\n{}\n{pace}. Random plans: {:.0} openings a second.\n",
+        "{} random plans with the climbed plan's key, {} pieces.\n\n{}\n{pace}. Random plans: {:.0} \
+         openings a second.\n",
         drawn.openings_mm.len(),
         scale.subject.model.assembly.n_parts,
         beside_median(&plans, at(0.5)),

@@ -20,8 +20,8 @@ pub fn markdown_of(
     let model = &subject.model;
     let (n_points, n_stations) = (model.assembly.points.len(), model.assembly.stations.len());
     let mut text = format!(
-        "# Metrics on random plans of {name}\n\n{} plans of {} pieces, key {}; {n_points} points, {} triangles, \
-         {n_stations} stations\n\n",
+        "# Metrics on random plans of {name}\n\n{} plans of {} pieces, key {}; {n_points} points, {} \
+         triangles, {n_stations} stations\n\n",
         subject.plans.len(),
         model.assembly.n_parts,
         subject.key,

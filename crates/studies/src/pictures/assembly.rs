@@ -224,7 +224,8 @@ pub fn first_page(kit: &Kit) -> Vec<u8> {
         // The image is small and has few colours, because it is part of the page's text.
         let data = shrunk(still);
         sheet.0.push_str(&format!(
-            "<image x=\"{}\" y=\"5\" width=\"250\" height=\"{HEIGHT}\" href=\"data:image/png;base64,{data}\"/>\n",
+            "<image x=\"{}\" y=\"5\" width=\"250\" height=\"{HEIGHT}\" \
+             href=\"data:image/png;base64,{data}\"/>\n",
             250 * i
         ));
     }

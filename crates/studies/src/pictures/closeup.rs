@@ -122,7 +122,8 @@ pub fn seams(kit: &Kit) -> Result<Vec<u8>, Failure> {
     }
     let made = &kit.design.kit;
     let words = format!(
-        "Cut faces are bright; the wall ({:.1} mm) is above. Gaps are as printed: {} mm in connectors, {} mm in the wall.",
+        "Cut faces are bright; the wall ({:.1} mm) is above. Gaps are as printed: {} mm in connectors, {} \
+         mm in the wall.",
         made.thickness_mm,
         kit.settings.connector.clearance_mm,
         2.0 * kit.settings.body.seam_gap_mm

@@ -55,7 +55,8 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     color_bar(&mut sheet, bar, 300.0, &format!("{most:.1} MPa"), words);
     let (number, down) = strength.deciding;
     let note = format!(
-        "fall {} of {}, down along ({:.2}, {:.2}, {:.2}); wall of {:.2} mm; the material bears {} MPa; grey: too thin to be hollow",
+        "fall {} of {}, down along ({:.2}, {:.2}, {:.2}); wall of {:.2} mm; the material bears {} MPa; \
+         grey: too thin to be hollow",
         number + 1,
         kit.settings.strength.n_cases,
         down.x,

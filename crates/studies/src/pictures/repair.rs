@@ -80,7 +80,8 @@ pub fn before_and_after() -> Result<Vec<u8>, Failure> {
         sheet.amid([left + 1.5 * VIEW[0], 20.0], &format!("{title}, cut open"));
     }
     let made = format!(
-        "Made with: {} triangles left out, {} turned (red), {} specks (dots), a ball pushed into the head (blue).",
+        "Made with: {} triangles left out, {} turned (red), {} specks (dots), a ball pushed into the head \
+         (blue).",
         broken.n_missing, broken.n_turned, broken.n_specks
     );
     sheet.words([24.0, top + VIEW[1] + 26.0], &made);

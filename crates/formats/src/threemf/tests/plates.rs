@@ -14,7 +14,8 @@ fn plate(number: u32, name: &str, instances: &[(u32, u32)]) -> String {
     };
     let instances: String = instances.iter().map(instance).collect();
     format!(
-        "<plate><metadata key=\"plater_id\" value=\"{number}\"/><metadata key=\"plater_name\" value=\"{name}\"/>{instances}</plate>"
+        "<plate><metadata key=\"plater_id\" value=\"{number}\"/><metadata key=\"plater_name\" \
+         value=\"{name}\"/>{instances}</plate>"
     )
 }
 
@@ -95,9 +96,11 @@ fn refusals_name_the_plate_and_the_parts_and_notes_count_what_was_taken() {
     );
     let parts = cube(1, "")
         + &cube(2, "")
-        + "<object id=\"9\"><components><component objectid=\"1\"/><component objectid=\"2\"/></components></object>";
-    let settings = "<config><object id=\"9\"><metadata key=\"name\" value=\"thing\"/><part id=\"1\" subtype=\"\"><metadata \
-                    key=\"name\" value=\"Body\"/></part><part id=\"2\"><metadata key=\"name\" value=\"Base\"/></part></object></config>";
+        + "<object id=\"9\"><components><component objectid=\"1\"/><component \
+           objectid=\"2\"/></components></object>";
+    let settings = "<config><object id=\"9\"><metadata key=\"name\" value=\"thing\"/><part id=\"1\" \
+                    subtype=\"\"><metadata key=\"name\" value=\"Body\"/></part><part id=\"2\"><metadata \
+                    key=\"name\" value=\"Base\"/></part></object></config>";
     let bytes = package(&[(USUAL_ROOT, &model(&parts, &items(&[9]))), (BAMBU, settings)]);
     assert_eq!(choose(&bytes, Some("Body"), None).unwrap().objects.len(), 1);
     let refused = choose(&bytes, Some("Hole"), None).unwrap_err().to_string();

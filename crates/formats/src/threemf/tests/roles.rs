@@ -159,8 +159,8 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
 fn a_role_belongs_to_a_component_of_an_object_and_not_to_the_mesh_that_others_share() {
     let component = |ids: [u32; 2]| {
         format!(
-            "<components><component p:path=\"/3D/o.model\" objectid=\"{}\"/><component p:path=\"/3D/o.model\" objectid=\"{}\"/>\
-             </components>",
+            "<components><component p:path=\"/3D/o.model\" objectid=\"{}\"/><component \
+             p:path=\"/3D/o.model\" objectid=\"{}\"/></components>",
             ids[0], ids[1]
         )
     };
@@ -193,8 +193,8 @@ fn a_role_belongs_to_a_component_of_an_object_and_not_to_the_mesh_that_others_sh
     assert_eq!(extruders, [2, 4, 1]);
     // Two files may use the same ids.
     let root = model(
-        "<object id=\"3\"><components><component p:path=\"/3D/o.model\" objectid=\"1\"/><component p:path=\"/3D/q.model\" \
-         objectid=\"1\"/></components></object>",
+        "<object id=\"3\"><components><component p:path=\"/3D/o.model\" objectid=\"1\"/><component \
+         p:path=\"/3D/q.model\" objectid=\"1\"/></components></object>",
         &items(&[3]),
     );
     let second = model(&boxed(1, "", "", [0.0, 0.0, 10.0], [10.0, 10.0, 30.0]), "");
