@@ -77,8 +77,8 @@ impl<'a> Ctx<'a> {
         }
     }
 
-    /// Makes the end of the time a stop: work that is not done by then is given up. The caller tells it from a stop of the
-    /// user by [`Ctx::check`] of the context that it came from.
+    /// Makes the end of the time a stop: work that is not done by then is given up. The caller tells it from
+    /// a stop of the user by [`Ctx::check`] of the context that it came from.
     pub fn ending_in_time(self) -> Self {
         Self {
             ends_in_time: true,
@@ -113,7 +113,8 @@ impl<'a> Ctx<'a> {
         (self.report)(Progress::Note(text));
     }
 
-    /// Fails if the user requested a stop, or at the end of the time where that is a stop. Long loops call it regularly.
+    /// Fails if the user requested a stop, or at the end of the time where that is a stop. Long loops call it
+    /// regularly.
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.stop.load(Ordering::Relaxed) || (self.ends_in_time && self.seconds_left() <= 0.0) {
             Err(Cancelled)

@@ -136,10 +136,11 @@ pub enum Command {
         #[arg(long)]
         closed_form: bool,
     },
-    /// Make a small plate of pins, channels, keys and rails at five clearances, to find those that fit on your
-    /// printer; then keep them as a printer of your own
+    /// Make a small plate of pins, channels, keys and rails at five clearances, to find those that fit on
+    /// your printer; then keep them as a printer of your own
     Coupon(CouponOptions),
-    /// Open a window in the browser, on this machine alone: choose, paint the pieces, place the key, make the kit
+    /// Open a window in the browser, on this machine alone: choose, paint the pieces, place the key, make the
+    /// kit
     Studio(StudioOptions),
     /// Make kits of all models in a folder; what is made already stays, so that it can be stopped and go on
     Batch(Box<BatchOptions>),
@@ -159,8 +160,8 @@ pub enum Command {
         model: PathBuf,
         #[command(flatten)]
         options: Options,
-        /// Also divide the surface, by its labels or else by --method, and say where the seams run, who sees them
-        /// and how pieces hold each other
+        /// Also divide the surface, by its labels or else by --method, and say where the seams run, who sees
+        /// them and how pieces hold each other
         #[arg(long, help_heading = "Pieces")]
         segment: bool,
     },

@@ -18,8 +18,8 @@ const DIVISIONS: [(&[u8], LabelSource); 3] = [
 /// Statements that end with a name, which may have any characters.
 const TAKES_A_NAME: [&[u8]; 4] = [b"usemtl", b"g", b"o", b"mtllib"];
 
-/// Statements that say nothing of where the surface is, or belong to those of curves, which only `curv`, `curv2` and
-/// `surf` begin.
+/// Statements that say nothing of where the surface is, or belong to those of curves, which only `curv`,
+/// `curv2` and `surf` begin.
 const HARMLESS: [&[u8]; 36] = [
     b"vn",
     b"vt",

@@ -128,8 +128,8 @@ impl Polygons {
         })
     }
 
-    /// Cuts each polygon into triangles that do not fold, in place of its fan. Returns how many have none; they stay
-    /// fans.
+    /// Cuts each polygon into triangles that do not fold, in place of its fan. Returns how many have none;
+    /// they stay fans.
     fn triangulate(&mut self) -> usize {
         let (points, faces) = (&self.mesh.points, &self.file_face);
         let (mut from, mut n_folded) = (0, 0);

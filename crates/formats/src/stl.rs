@@ -20,8 +20,9 @@ pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
 
 /// Reads a binary STL, or several one after the other, as `cat` makes them.
 ///
-/// A count may be 0 or all ones, from programs that write without knowing it, or too low. Further data is read
-/// if it looks like triangles, and skipped otherwise. A count that is too high is an error: the file was cut off.
+/// A count may be 0 or all ones, from programs that write without knowing it, or too low. Further data is
+/// read if it looks like triangles, and skipped otherwise. A count that is too high is an error: the file was
+/// cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     let (mut colors, mut notes) = (Colors::default(), Vec::new());
@@ -144,8 +145,8 @@ fn is_like_a_triangle(bytes: &[u8]) -> bool {
     (length_sq == 0.0 || (length_sq - 1.0).abs() < 0.1) && (3..12).all(|i| float(i).is_finite())
 }
 
-/// Colours in the last two bytes of triangles: 5 bits each of red, green and blue, and a bit that tells if they
-/// are valid.
+/// Colours in the last two bytes of triangles: 5 bits each of red, green and blue, and a bit that tells if
+/// they are valid.
 #[derive(Default)]
 struct Colors {
     /// Value of the highest bit in triangles with a colour of their own: set in most programs, not set in

@@ -31,8 +31,8 @@ fn v(p: Vec3) -> V {
     V::new(p.x, p.y, p.z)
 }
 
-/// Triangles of the corners of a counter-clockwise polygon in the plane, by ears. Polygons that cross themselves
-/// give triangles that overlap.
+/// Triangles of the corners of a counter-clockwise polygon in the plane, by ears. Polygons that cross
+/// themselves give triangles that overlap.
 pub(crate) fn cut_by_ears(corners: &[[f64; 2]]) -> Vec<[u32; 3]> {
     /// The library's own tolerance, from the size of the polygon.
     const AUTOMATIC: f64 = -1.0;

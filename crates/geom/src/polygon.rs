@@ -3,11 +3,11 @@
 use crate::Vec3;
 use crate::boolean::cut_by_ears;
 
-/// Corners up to which a fan is kept where it does not fold; larger ones would have slivers that all meet at one
-/// corner.
+/// Corners up to which a fan is kept where it does not fold; larger ones would have slivers that all meet at
+/// one corner.
 const LARGEST_FAN: usize = 32;
-/// Share of the polygon's area by which its triangles may differ from it, and by which one may face the other way:
-/// above the rounding of coordinates in 32 bits.
+/// Share of the polygon's area by which its triangles may differ from it, and by which one may face the other
+/// way: above the rounding of coordinates in 32 bits.
 const AREA_SLACK: f64 = 1e-6;
 
 /// Cuts a polygon into triangles of its corners, as many as it has corners less two, which face as it does.
@@ -45,8 +45,8 @@ fn area_vector_doubled(corners: &[Vec3]) -> Vec3 {
         .sum()
 }
 
-/// True if `triangles` are as many as the polygon needs and none faces against `normal`, so that each place of the
-/// polygon is covered by one.
+/// True if `triangles` are as many as the polygon needs and none faces against `normal`, so that each place
+/// of the polygon is covered by one.
 fn covers_once(corners: &[Vec3], triangles: &[[u32; 3]], normal: Vec3) -> bool {
     let all = area_vector_doubled(corners).dot(normal);
     let slack = AREA_SLACK * all;

@@ -1,7 +1,7 @@
 //! The whole job: from a closed mesh to interlocking pieces that were verified.
 //!
-//! One loop makes kits until one is good: the [`agenda`] says what is tried next, a [`trial`] makes that change, and an
-//! [`attempt`] plans and makes the kit and returns what may help if it fails.
+//! One loop makes kits until one is good: the [`agenda`] says what is tried next, a [`trial`] makes that
+//! change, and an [`attempt`] plans and makes the kit and returns what may help if it fails.
 //!
 //! ```text
 //!               change                     found
@@ -49,13 +49,13 @@ use trial::{Change, Parts, Trial};
 use wall::Wall;
 use ways::Input;
 
-/// Makes a kit of `model` (mm), from `labels` (one a triangle) if given. Kits are made until one passes or nothing else
-/// is left to try. Then the best of them is returned with its failures.
+/// Makes a kit of `model` (mm), from `labels` (one a triangle) if given. Kits are made until one passes or
+/// nothing else is left to try. Then the best of them is returned with its failures.
 ///
-/// Pieces that a person would cut come first ([`segmentation::Method::Auto`]). Such a kit is asked to withstand its loads
-/// with a reserve. If none passes with the wall that this takes, the wall becomes as thin as a fall allows. If none passes
-/// at all, fewer pieces are tried, then still fewer with the thinnest walls, then pieces of similar size: that a kit
-/// locks comes before what it withstands.
+/// Pieces that a person would cut come first ([`segmentation::Method::Auto`]). Such a kit is asked to
+/// withstand its loads with a reserve. If none passes with the wall that this takes, the wall becomes as thin
+/// as a fall allows. If none passes at all, fewer pieces are tried, then still fewer with the thinnest walls,
+/// then pieces of similar size: that a kit locks comes before what it withstands.
 ///
 /// The work may end early if the context has a deadline ([`Ctx::seconds_left`]), which is then reported.
 pub fn design(
@@ -90,8 +90,8 @@ fn resolved(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Pa
     })
 }
 
-/// Tries what the agenda says until an end is good enough or nothing is left to try. Once there is an end, trials that are
-/// not done in time are given up.
+/// Tries what the agenda says until an end is good enough or nothing is left to try. Once there is an end,
+/// trials that are not done in time are given up.
 fn explore<'a, T>(
     ctx: &Ctx,
     agenda: &mut Agenda,
@@ -159,8 +159,8 @@ fn explore<'a, T>(
     }
 }
 
-/// The plan that [`design`] would make first, in the space of the model as it was given. Pieces are numbered as they are
-/// installed.
+/// The plan that [`design`] would make first, in the space of the model as it was given. Pieces are numbered
+/// as they are installed.
 #[non_exhaustive]
 pub struct Planned {
     /// The pieces.
@@ -180,7 +180,8 @@ pub struct Planned {
 }
 
 impl Planned {
-    /// Hands over a plan for a `surface` that was turned by `turn`, with warnings of the plan and of the wall.
+    /// Hands over a plan for a `surface` that was turned by `turn`, with warnings of the plan and of the
+    /// wall.
     fn new(
         turn: &Turn,
         surface: &SegmentedSurface,
@@ -201,8 +202,8 @@ impl Planned {
     }
 }
 
-/// Seeks the plan that [`design`] would make its first kit of, or the reason why there is none: the same loop, ended before
-/// anything is made.
+/// Seeks the plan that [`design`] would make its first kit of, or the reason why there is none: the same
+/// loop, ended before anything is made.
 pub fn plan(
     ctx: &Ctx,
     params: &Params,

@@ -1,5 +1,5 @@
-//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that they
-//! hold.
+//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that
+//! they hold.
 //!
 //! After Yao, Chen, Xu, Wang, "Modeling, Evaluation and Optimization of Interlocking Shell Pieces", Computer
 //! Graphics Forum 36(7), Pacific Graphics 2017.
@@ -22,9 +22,9 @@
 //! [`mod@design`] is the whole job. Its stages, in the only direction that data flows, each a module with its
 //! parameters and a plain function: [`strength`] (how thick the wall) → [`segmentation`] (which pieces) →
 //! [`key`] (where the last one slides out) → [`sizes`] (of connectors) → [`plan`] (order and directions) and
-//! [`metric`] (which plan holds best) → [`body`] (the wall, split) → [`connector`] (what is under its seams) →
-//! [`piece`] (finished meshes) → [`mod@verify`], [`play`] and [`certificate`], which know nothing of the stages
-//! before and judge anybody's assembly.
+//! [`metric`] (which plan holds best) → [`body`] (the wall, split) → [`connector`] (what is under its seams)
+//! → [`piece`] (finished meshes) → [`mod@verify`], [`play`] and [`certificate`], which know nothing of the
+//! stages before and judge anybody's assembly.
 
 pub mod body;
 pub mod connector;

@@ -542,7 +542,8 @@ impl Workshop for Bench {
     }
 }
 
-/// `words` without the path of `folder` before the names of files in it, which ends in this system's separator.
+/// `words` without the path of `folder` before the names of files in it, which ends in this system's
+/// separator.
 fn without_folder(words: &str, folder: &Path) -> String {
     words.replace(&folder.join("").display().to_string(), "")
 }

@@ -245,8 +245,8 @@ impl<'a> Body<'a> {
     }
 }
 
-/// Marks the items to read: the printable ones, or all if none is printable. The others stay in the list, because
-/// slicers number instances with them.
+/// Marks the items to read: the printable ones, or all if none is printable. The others stay in the list,
+/// because slicers number instances with them.
 fn is_made(items: &[Item]) -> Vec<bool> {
     let prints = items.iter().any(|item| item.is_printed);
     items.iter().map(|item| item.is_printed || !prints).collect()

@@ -21,8 +21,8 @@ struct Declaration {
 }
 
 impl Namespaces {
-    /// Adds the declarations of the element at `depth`. The first element of a part defines the part's own namespace
-    /// by its `prefix`.
+    /// Adds the declarations of the element at `depth`. The first element of a part defines the part's own
+    /// namespace by its `prefix`.
     pub(super) fn open(&mut self, depth: usize, prefix: &str, declared: BTreeMap<String, String>) {
         if self.own.is_none() {
             self.own = Some(declared.get(prefix).cloned().unwrap_or_default());
@@ -47,8 +47,8 @@ impl Namespaces {
         }
     }
 
-    /// Returns true if an element, or a prefixed attribute, of this full name is in a foreign namespace. Undeclared
-    /// prefixes are not foreign, because some writers forget the declaration.
+    /// Returns true if an element, or a prefixed attribute, of this full name is in a foreign namespace.
+    /// Undeclared prefixes are not foreign, because some writers forget the declaration.
     pub(super) fn is_foreign(&self, name: &str) -> bool {
         let prefix = prefix(name);
         self.declared

@@ -213,8 +213,9 @@ impl PartReader<'_, '_> {
         if self.number == 0 {
             (self.model.unit_mm, self.model.unit_is_stated) = (unit_mm, !unit.is_empty());
         } else if unit_mm != self.model.unit_mm {
-            // The unit is an attribute of a part's own `model` and holds for all vertices and measurements in it (core
-            // specification 1.3, section 3.4); no part takes over that of another, and without one it is the millimetre.
+            // The unit is an attribute of a part's own `model` and holds for all vertices and measurements in
+            // it (core specification 1.3, section 3.4); no part takes over that of another, and without one
+            // it is the millimetre.
             self.scale = unit_mm / self.model.unit_mm;
             self.model.converted.insert(self.name.to_owned());
         }

@@ -71,8 +71,8 @@ struct Open {
 impl Settings {
     /// Reads the settings in the package; empty if it has none, as a plain 3MF does.
     ///
-    /// A settings file that cannot be parsed is an error: the roles after the fault are unknown, so a negative
-    /// volume could be read as a part of the model.
+    /// A settings file that cannot be parsed is an error: the roles after the fault are unknown, so a
+    /// negative volume could be read as a part of the model.
     pub(super) fn read(package: &mut Package) -> Result<Self, ReadError> {
         let mut settings = Self::default();
         for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {

@@ -1,7 +1,7 @@
 //! The subset of XML that 3MF needs: elements with their attributes, text and place.
 //!
-//! A prefix is the file's choice: elements and attributes are known by their local names, unless the namespace of
-//! their prefix is one that is not read.
+//! A prefix is the file's choice: elements and attributes are known by their local names, unless the
+//! namespace of their prefix is one that is not read.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -126,9 +126,11 @@ impl<'a> Elements<'a> {
     }
 
     /// Hands each attribute of `element` to `take` by its local name, and refuses two of the same full name.
-    /// Declarations of namespaces are no attributes, and those of namespaces that are not read are passed over.
+    /// Declarations of namespaces are no attributes, and those of namespaces that are not read are passed
+    /// over.
     ///
-    /// An attribute without a prefix wins over one with the same local name, unless only extensions define it.
+    /// An attribute without a prefix wins over one with the same local name, unless only extensions define
+    /// it.
     pub(super) fn attributes(
         &self,
         element: &BytesStart,

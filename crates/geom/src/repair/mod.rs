@@ -158,8 +158,8 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
     Ok((draft, repairs, welded.n_collapsed))
 }
 
-/// A closed surface of any number of bodies, made of a mesh as read and repaired as by [`repair`]; and whether it had
-/// holes, which were closed.
+/// A closed surface of any number of bodies, made of a mesh as read and repaired as by [`repair`]; and
+/// whether it had holes, which were closed.
 pub(crate) fn closed(mesh: &TriMesh) -> Result<(TriMesh, bool), InputError> {
     check_points(mesh)?;
     let (mut draft, repairs, _) = close_up(mesh)?;

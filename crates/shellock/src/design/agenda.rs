@@ -1,9 +1,9 @@
 //! The agenda: what is tried next, how often, and until when.
 //!
-//! A trial is one division of the model with one key, one wall and one set of connectors. Its result offers changes.
-//! The agenda takes the first one that [`table::TABLE`] still allows and for which time is left. If there is none, it goes
-//! outwards: the next key, then less load, then the next way to divide. No geometry is needed to know the order, so a
-//! text file keeps it (`agenda/order.txt`).
+//! A trial is one division of the model with one key, one wall and one set of connectors. Its result offers
+//! changes. The agenda takes the first one that [`table::TABLE`] still allows and for which time is left. If
+//! there is none, it goes outwards: the next key, then less load, then the next way to divide. No geometry is
+//! needed to know the order, so a text file keeps it (`agenda/order.txt`).
 //!
 //! ```text
 //!  way ─► load asked ─► wall ─► key ─► division ─► plan ─► kit
@@ -25,7 +25,8 @@ use crate::sizes::SizeChoice;
 pub(super) use table::Step;
 use table::{ANY, Level, TABLE};
 
-/// Number of places at which a key is cut before a piece becomes the key: if the best place fails, others seldom help.
+/// Number of places at which a key is cut before a piece becomes the key: if the best place fails, others
+/// seldom help.
 pub(super) const CUT_KEYS: usize = 3;
 /// Keys whose kits fail by rattling alone, after which no others are tried: another key changes little.
 const RATTLING_KEYS: usize = 2;
@@ -34,7 +35,8 @@ const RATTLING_KEYS: usize = 2;
 const RESERVE: f64 = 1.4;
 /// Load factor at which a kit withstands its loads, but has no reserve.
 const ONCE: f64 = 1.0;
-/// Safety factor on the slowest kit so far. It covers measuring gaps, writing files, and the spread between kits.
+/// Safety factor on the slowest kit so far. It covers measuring gaps, writing files, and the spread between
+/// kits.
 const SPREAD: f64 = 1.5;
 /// Bounds of every way to divide but the last one.
 const ROUNDS_BESIDE_OTHERS: Rounds = Rounds {
@@ -67,7 +69,8 @@ pub(super) struct Allowance {
     permits: [Permit; TABLE.len()],
     /// Load factor below which changes are sought.
     pub asked: f64,
-    /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then joined.
+    /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
+    /// joined.
     pub is_hopeless: bool,
 }
 

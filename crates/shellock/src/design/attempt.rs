@@ -65,7 +65,8 @@ impl Failure {
         }
     }
 
-    /// Two pieces never lock: if the key leaves one way, nothing keeps the other piece from leaving the opposite way.
+    /// Two pieces never lock: if the key leaves one way, nothing keeps the other piece from leaving the
+    /// opposite way.
     fn of_two() -> Self {
         Self {
             blamed: vec![PatchId(0), PatchId(1)],
@@ -278,8 +279,8 @@ fn predicted_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
 
 /// Next thing to do with a division.
 pub(super) enum Next {
-    /// Make the kit of this plan, which holds best of those that cost about the least. A lack of time may have ruled out
-    /// a step that would make it stronger.
+    /// Make the kit of this plan, which holds best of those that cost about the least. A lack of time may
+    /// have ruled out a step that would make it stronger.
     Plan(Box<Chosen>, Option<Step>),
     /// Make nothing yet: change the trial first.
     Changes(Vec<Change>, Option<Step>),

@@ -38,8 +38,8 @@ pub(super) fn sites(ctx: &Ctx, job: &Job<'_>) -> Result<Vec<KeySite>, DesignErro
 }
 
 impl<'a> Candidate<'a> {
-    /// Turns the model so that a key cut at `place` slides along a lattice direction; `None` if rounding then leaves no
-    /// solid.
+    /// Turns the model so that a key cut at `place` slides along a lattice direction; `None` if rounding then
+    /// leaves no solid.
     pub fn new(job: &Job<'a>, place: Option<&KeySite>) -> Option<Self> {
         let as_it_lies = Self {
             turn: Turn::default(),
@@ -64,8 +64,8 @@ impl<'a> Candidate<'a> {
         Some(turned)
     }
 
-    /// Cuts the key out of these pieces and settles what the stages are given; `None` if the key does not come out as one
-    /// piece.
+    /// Cuts the key out of these pieces and settles what the stages are given; `None` if the key does not
+    /// come out as one piece.
     pub fn divide(
         &self,
         ctx: &Ctx,
@@ -127,8 +127,8 @@ impl<'a> Candidate<'a> {
 }
 
 impl CutKey {
-    /// Returns the surface with the key as a patch, and the id of that patch. If the key leaves a piece hanging on another,
-    /// the pieces are refined first.
+    /// Returns the surface with the key as a patch, and the id of that patch. If the key leaves a piece
+    /// hanging on another, the pieces are refined first.
     fn imprinted(
         &self,
         ctx: &Ctx,

@@ -69,8 +69,9 @@ impl WallGrid {
 
 /// Changes the pieces after a failure; `None` if nothing can be changed.
 ///
-/// Dividing comes first, since it keeps the user's labels. Pieces that came loose where seams are short would only get
-/// shorter seams: they are joined to a neighbour. If `is_hopeless`, so is the piece that blocked every plan.
+/// Dividing comes first, since it keeps the user's labels. Pieces that came loose where seams are short would
+/// only get shorter seams: they are joined to a neighbour. If `is_hopeless`, so is the piece that blocked
+/// every plan.
 pub(super) fn revise(
     ctx: &Ctx,
     division: &Division,

@@ -1,8 +1,9 @@
-//! From where pieces are made to what people hold: the model as they gave it, and pieces numbered in the order
-//! in which they go in.
+//! From where pieces are made to what people hold: the model as they gave it, and pieces numbered in the
+//! order in which they go in.
 //!
-//! Pieces are made of the model turned for its key, by the patches of a division. Nobody outside needs to know
-//! of either: what a kit says is in the space of the model as it was given, and its first piece is number 1.
+//! Pieces are made of the model turned for its key, by the patches of a division. Nobody outside needs to
+//! know of either: what a kit says is in the space of the model as it was given, and its first piece is
+//! number 1.
 
 use shellock_geom::{TriMesh, Vec3};
 

@@ -28,7 +28,8 @@ use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
     pub kit: Kit,
-    /// Parameters of the stages that made it, for its own wall and division. Those that only a cut key has are left out.
+    /// Parameters of the stages that made it, for its own wall and division. Those that only a cut key has
+    /// are left out.
     pub settings: Settings,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
@@ -49,12 +50,12 @@ pub struct Design {
 /// What a printer's error does to a kit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PrintedFit {
-    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces, at
-    /// rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces cross;
-    /// `None` where no two pieces come near.
+    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces,
+    /// at rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces
+    /// cross; `None` where no two pieces come near.
     pub within_mm: Option<f64>,
-    /// The piece that rattles most where all faces stand back by as much, and how far, for small motions; play
-    /// without end where it comes loose. `None` for kits that fail anyway.
+    /// The piece that rattles most where all faces stand back by as much, and how far, for small motions;
+    /// play without end where it comes loose. `None` for kits that fail anyway.
     pub loosest: Option<(PatchId, Play)>,
 }
 
@@ -120,8 +121,8 @@ impl<T> Best<T> {
         }
     }
 
-    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far; of equals the earlier
-    /// stays.
+    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far; of equals
+    /// the earlier stays.
     pub fn offer(
         &mut self,
         end: T,
@@ -178,7 +179,8 @@ impl<T> Best<T> {
         self.reject(ctx, reason);
     }
 
-    /// Closes a key that cannot be made. The error is the job's only if a piece is the key and no kit was made.
+    /// Closes a key that cannot be made. The error is the job's only if a piece is the key and no kit was
+    /// made.
     pub fn close_key_with(&mut self, ctx: &Ctx, site: Option<&KeySite>, error: DesignError) {
         (self.present, self.of_key) = (Failure::default(), None);
         match site {

@@ -1,5 +1,5 @@
-//! Outlook of a division before anything is made of it: the pieces as they will be cut, places for a key, and whether
-//! there is a plan. Takes a second where a kit takes a minute.
+//! Outlook of a division before anything is made of it: the pieces as they will be cut, places for a key, and
+//! whether there is a plan. Takes a second where a kit takes a minute.
 
 use shellock_geom::{Solid, Vec3};
 
@@ -67,12 +67,12 @@ pub fn first_division(
     Ok(divided)
 }
 
-/// Judges the first division that [`design`](super::design) makes kits of, with the wall as thick as `params` say or of
-/// usual thickness, and connectors of usual size. `divided` is the result of [`first_division`] for the same input, if
-/// that is known: then the model is not divided again.
+/// Judges the first division that [`design`](super::design) makes kits of, with the wall as thick as `params`
+/// say or of usual thickness, and connectors of usual size. `divided` is the result of [`first_division`] for
+/// the same input, if that is known: then the model is not divided again.
 ///
-/// Nothing is simulated: pieces that lock here may still rattle or be too weak, and then pieces are joined or walls
-/// become thicker. Plans are searched, not proven.
+/// Nothing is simulated: pieces that lock here may still rattle or be too weak, and then pieces are joined or
+/// walls become thicker. Plans are searched, not proven.
 pub fn outlook(
     ctx: &Ctx,
     params: &Params,

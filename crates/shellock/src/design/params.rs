@@ -21,12 +21,13 @@ pub struct Params {
     pub seed: u64,
     /// How pieces are found where there are no labels; where people would divide ([`Method::Auto`]).
     pub method: Method,
-    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in creases
-    /// from the area, 10 for a figure of 150 mm.
+    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in
+    /// creases from the area, 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
     /// Regions that no seam is to divide; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry alike; no.
+    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry
+    /// alike; no.
     pub symmetric: bool,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],

@@ -169,7 +169,8 @@ fn plan(params: &Params) -> PlanParams {
     }
 }
 
-/// What the wall must bear. Two lines stand on either side of a seam's pin; three in all where the model is thin.
+/// What the wall must bear. Two lines stand on either side of a seam's pin; three in all where the model is
+/// thin.
 fn strength(params: &Params) -> StrengthParams {
     const LEAST_WALLS: f64 = 4.0;
     const THIN_WALLS: f64 = 3.0;

@@ -1,5 +1,5 @@
-//! Changes before a kit is made, if the strongest plan is weaker than what is asked: larger connectors where it gives
-//! way, then a thicker wall, then other pieces.
+//! Changes before a kit is made, if the strongest plan is weaker than what is asked: larger connectors where
+//! it gives way, then a thicker wall, then other pieces.
 //!
 //! The same plan is first rated with each change. Then planning begins anew with it.
 
@@ -28,8 +28,8 @@ const MOST_WALLS: usize = 4;
 /// Steps of wall thickness per mm.
 const WALLS_A_MM: f64 = 10.0;
 
-/// Finds changes that make the chosen plan stronger, most promising first: none if it is strong enough, or if nothing
-/// that is allowed helps. Also returns the step that a lack of time rules out.
+/// Finds changes that make the chosen plan stronger, most promising first: none if it is strong enough, or if
+/// nothing that is allowed helps. Also returns the step that a lack of time rules out.
 pub(super) fn strengthen(
     ctx: &Ctx,
     planning: &Planning<'_>,
@@ -85,8 +85,8 @@ pub(super) fn strengthen(
     Ok((changes, late))
 }
 
-/// Returns true if a change is worth it that raises the least load factor from `before` to `after`. A plan that holds under
-/// no load has the factor 0, of which any multiple is 0.
+/// Returns true if a change is worth it that raises the least load factor from `before` to `after`. A plan
+/// that holds under no load has the factor 0, of which any multiple is 0.
 fn is_worth(before: f64, after: f64) -> bool {
     after > before && after >= GAIN * before
 }
@@ -132,8 +132,9 @@ impl Rating<'_> {
             .map_err(|e| ChoiceError::from(e).into())
     }
 
-    /// Enlarges, to the largest that fits, the connectors of every pair that opens under a load which the kit does not
-    /// bear; repeats, since another pair may then open first. Returns the best round's sizes and its least load factor.
+    /// Enlarges, to the largest that fits, the connectors of every pair that opens under a load which the kit
+    /// does not bear; repeats, since another pair may then open first. Returns the best round's sizes and its
+    /// least load factor.
     fn enlarge(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), DesignError> {
         let aim = self.asked + AIM;
         let mut best = (self.division.chosen.clone(), least(bears));
@@ -160,8 +161,8 @@ impl Rating<'_> {
         Ok(best)
     }
 
-    /// Finds the thinnest wall that is strong enough, or the thickest one if that gains something; `None` if the cavity would
-    /// become too small.
+    /// Finds the thinnest wall that is strong enough, or the thickest one if that gains something; `None` if
+    /// the cavity would become too small.
     fn thicken(
         &self,
         planning: &Planning<'_>,
@@ -174,8 +175,8 @@ impl Rating<'_> {
         };
         let (mut wall_mm, mut borne) = (self.handling.wall_mm, before);
         for _ in 0..MOST_WALLS {
-            // Plates stiffen with the cube of their thickness, but openings shrink by less than that. The plan that is
-            // found with this wall is stronger than the present one.
+            // Plates stiffen with the cube of their thickness, but openings shrink by less than that. The
+            // plan that is found with this wall is stronger than the present one.
             let wanted_mm = wall_mm * (self.asked / borne.max(0.1)).sqrt();
             let stepped_mm = (wanted_mm * WALLS_A_MM).ceil() / WALLS_A_MM;
             let next_mm = stepped_mm.max(wall_mm + 1.0 / WALLS_A_MM).min(most_mm);
@@ -258,8 +259,8 @@ mod tests {
         }
     }
 
-    /// Seeks changes of a ball in four pieces with this load factor under a press on its top, if only these steps are
-    /// allowed.
+    /// Seeks changes of a ball in four pieces with this load factor under a press on its top, if only these
+    /// steps are allowed.
     fn changes(borne: f64, steps: &[(Step, Permit)]) -> (Vec<Step>, Option<Step>) {
         let (ctx, ball) = (Ctx::quiet(), Ball::new());
         let job = ball.job(N);

@@ -1,4 +1,5 @@
-//! A trial: one division of the model with one key, one wall and one set of connectors, and what was learned of it.
+//! A trial: one division of the model with one key, one wall and one set of connectors, and what was learned
+//! of it.
 //!
 //! A change replaces one layer of the trial and all layers that are made from it; the others are kept.
 
@@ -313,7 +314,8 @@ impl<'a> Trial<'a> {
         Ok(None)
     }
 
-    /// Takes other pieces. If no key can be cut of joined pieces, keeps those that are, and joins no others for that reason.
+    /// Takes other pieces. If no key can be cut of joined pieces, keeps those that are, and joins no others
+    /// for that reason.
     fn use_pieces(
         &mut self,
         ctx: &Ctx,

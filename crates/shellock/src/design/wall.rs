@@ -41,8 +41,8 @@ impl Wall {
         }
     }
 
-    /// Decides the thickness by the stress in a fall. Fails if the model is too thin for hollow pieces and connectors,
-    /// unless the user allows that.
+    /// Decides the thickness by the stress in a fall. Fails if the model is too thin for hollow pieces and
+    /// connectors, unless the user allows that.
     pub fn decide(ctx: &Ctx, &Input { params, model, .. }: &Input<'_>) -> Result<Self, DesignError> {
         let nominal = Self::nominal(params);
         let ours = &nominal.settings.strength;

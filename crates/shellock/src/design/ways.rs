@@ -50,13 +50,13 @@ pub(super) enum Walls {
     Thin,
 }
 
-/// Coarser divisions if the user asks for no number of pieces: share of the usual number, and walls. Fewer pieces have
-/// longer seams, and thin bars are held by few seams.
+/// Coarser divisions if the user asks for no number of pieces: share of the usual number, and walls. Fewer
+/// pieces have longer seams, and thin bars are held by few seams.
 const COARSER: [(f64, Walls); 2] = [(0.7, Walls::ForFalls), (0.35, Walls::Thin)];
 
-/// Lists the ways to divide, in order: where a person would cut, coarser, still coarser with thin walls, and pieces of
-/// similar size with thin walls. There is one way only if the user gives labels, a method or the number of the key's
-/// piece.
+/// Lists the ways to divide, in order: where a person would cut, coarser, still coarser with thin walls, and
+/// pieces of similar size with thin walls. There is one way only if the user gives labels, a method or the
+/// number of the key's piece.
 pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
     let params = input.params;
     let first = Way {

@@ -64,8 +64,8 @@ const fn row(step: Step, begins: Level, within: Level, most: [usize; 2]) -> Row 
 /// No limit but the user's.
 pub(super) const ANY: usize = usize::MAX;
 
-/// All limits. A plan that is given up costs seconds, a joining that is predicted costs a search, and a kit costs most
-/// of a minute.
+/// All limits. A plan that is given up costs seconds, a joining that is predicted costs a search, and a kit
+/// costs most of a minute.
 pub(super) const TABLE: [Row; 11] = [
     row(Step::Replan, Level::Plan, Level::Division, [7, 7]),
     row(Step::Remake, Level::Plan, Level::Division, [1, ANY]),
@@ -81,7 +81,8 @@ pub(super) const TABLE: [Row; 11] = [
 ];
 
 impl Step {
-    /// Returns true if the step leaves the present key for another one, or for another wall since no kit passed.
+    /// Returns true if the step leaves the present key for another one, or for another wall since no kit
+    /// passed.
     pub fn closes_key(self) -> bool {
         matches!(self, Self::NextKey | Self::LowerLoad | Self::NextWay)
     }

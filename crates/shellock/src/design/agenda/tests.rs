@@ -1,4 +1,5 @@
-//! Order of trials, in histories that are made up: `order.txt` lists them, and is written anew with `UPDATE_ORDER=1`.
+//! Order of trials, in histories that are made up: `order.txt` lists them, and is written anew with
+//! `UPDATE_ORDER=1`.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -64,8 +65,8 @@ fn rattling_too_much() -> Report {
     offering(kit(1, 3.0), &[Step::JoinRattling])
 }
 
-/// Job whose trials end as `reply` says from their number and what they are allowed. A trial takes `plan_s`, and a kit
-/// `kit_s` on top.
+/// Job whose trials end as `reply` says from their number and what they are allowed. A trial takes `plan_s`,
+/// and a kit `kit_s` on top.
 struct Story {
     title: &'static str,
     ways: Vec<Way>,
