@@ -1,6 +1,6 @@
 //! Report on a finished kit for people: in short, or in full.
 
-use shellock::design::{Design, Settings};
+use shellock::design::{Design, Effort, Settings};
 use shellock::metric::Holding;
 use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
@@ -89,7 +89,20 @@ impl Finished<'_> {
             "connectors on {:.0} % of the seam length that fits any",
             100.0 * self.summary.connector_share
         );
+        println!("{}", tried(&made.effort));
     }
+}
+
+/// Lists what was tried, in order.
+fn tried(effort: &Effort) -> String {
+    let mut text = format!(
+        "tried: {} keys, {} divisions, {} plans, {} kits",
+        effort.keys, effort.segmentations, effort.plans, effort.kits
+    );
+    for (i, step) in effort.steps.iter().enumerate() {
+        text += &format!("\n  {}. {step}", i + 1);
+    }
+    text
 }
 
 /// Describes the wall's stress in a fall.
