@@ -120,7 +120,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", usize::from(s.piece)), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });
-    let plan = json!({ "key_piece": 3, "installation_order": [1, 2, 3], "clearance": CLEARANCE_MM,
+    let plan = json!({ "version": 2, "key_piece": 3, "installation_order": [1, 2, 3], "clearance": CLEARANCE_MM,
                        "pieces": pieces.collect::<Vec<_>>() });
     let mut certificate = serde_json::to_value(certificate).unwrap();
     // Gaps are visible from outside, which does not matter here.

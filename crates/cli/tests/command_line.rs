@@ -361,7 +361,8 @@ fn labelled_cube(label: [i32; 12]) -> String {
 }
 
 /// Entries that `test` reads from a plan of two pieces.
-const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 1, "installation_direction": [0, 0, 1] },
+const TWO_PIECES: &str = r#"{ "format": "shellock-plan", "version": 2,
+    "pieces": [ { "id": 1, "installation_direction": [0, 0, 1] },
     { "id": 2, "installation_direction": [0, 0, -1] } ], "installation_order": [1, 2], "up": [0, 0, 1],
     "shell_thickness": 2, "connector_size": 2.5 }"#;
 

@@ -1,14 +1,13 @@
 //! `plan.json`: pieces, order, directions and figures of a kit.
 //!
 //! Each object of the file has a type, and fields have the file's names. Places and directions are in
-//! assembly space, lengths in mm. Fields that a kit of an earlier version may lack are optional. Files of
-//! earlier versions are converted before they are read, those of later versions are rejected.
+//! assembly space, lengths in mm. Fields that no command needs are optional. Files of other versions are
+//! rejected.
 
 mod checked;
 mod entries;
 mod error;
 mod fill;
-mod former;
 #[cfg(test)]
 mod tests;
 
@@ -80,11 +79,11 @@ pub struct PlanFile {
     pub pieces: Vec<PieceEntry>,
     /// Ids of the pieces in order of installation.
     pub installation_order: Vec<PatchId>,
-    /// Quality of the plan; `None` if version 1 gave it in another form.
+    /// Quality of the plan.
     pub plan: Option<PlanProof>,
-    /// Simulated resistance of the plan to separation; `None` if version 1 gave it in another form.
+    /// Simulated resistance of the plan to separation.
     pub holding: Option<Holding>,
-    /// Summary of the loads that the kit withstands; `None` in kits of version 1.
+    /// Summary of the loads that the kit withstands.
     pub bears: Option<Bears>,
     /// Material of all pieces divided by that of the solid model.
     pub volume_ratio: Option<f64>,
@@ -109,19 +108,34 @@ pub struct PlanFile {
     pub printing: Option<PrintingEntry>,
 }
 
+/// Rejects a plan of another format or version.
+fn check_version(plan: &Value) -> Result<(), PlanFileError> {
+    if plan["format"] != FORMAT {
+        return Err(PlanFileError::OtherFormat);
+    }
+    match plan["version"].as_u64() {
+        Some(VERSION) => Ok(()),
+        Some(version @ 1..) => Err(PlanFileError::OtherVersion { version }),
+        _ => Err(PlanFileError::OtherFormat),
+    }
+}
+
 impl PlanFile {
     /// Parses a plan from the bytes of its file.
     ///
     /// Consistency of its parts is checked by the methods that rely on it, such as [`Self::order`].
     ///
-    /// Errors: no JSON, no object, another format, a later version, or a field that is missing or mistyped.
+    /// Errors: no JSON, no object, another format or version, or a field that is missing or mistyped.
     pub fn read(bytes: &[u8]) -> Result<Self, PlanFileError> {
         let value: Value = serde_json::from_slice(bytes).map_err(PlanFileError::NotJson)?;
         if !value.is_object() {
             return Err(PlanFileError::NotAnObject);
         }
-        serde_path_to_error::deserialize(former::converted(value)?)
-            .map_err(|e| PlanFileError::of_field(&e.path().to_string(), &e.inner().to_string()))
+        check_version(&value)?;
+        serde_path_to_error::deserialize(value).map_err(|e| PlanFileError::Mistyped {
+            field: e.path().to_string(),
+            problem: e.into_inner().to_string(),
+        })
     }
 
     /// Writes the file, with fields in alphabetical order, one per line.
