@@ -157,7 +157,7 @@ pub struct Options {
     /// piece
     #[arg(long, value_name = "FILE", help_heading = "Pieces")]
     pub labels: Option<PathBuf>,
-    /// Data in the file that divide it: labels, paint, colors …
+    /// Source of the division: labels, paint, colors …
     ///
     /// Data in the model's own file that divide it into pieces
     #[arg(

@@ -254,10 +254,8 @@ fn told_pieces(
         let middle = middle(mesh, &faces);
         let fits_bed = is_small || fits(&printer, &shell_of(&surface, PatchId(piece), wall_mm));
         let mut say = |severity: Severity, words: String| {
-            advice.push(
-                json!({ "severity": severity, "words": words, "at": view.at(middle.to_array()),
-                "mends": false }),
-            );
+            let at = view.at(middle.to_array());
+            advice.push(json!({ "severity": severity, "words": words, "at": at, "mends": false }));
         };
         if !fits_bed {
             let words = format!(
