@@ -14,7 +14,8 @@ use shellock_formats::read_mesh;
 
 const POINTS: u64 = 5;
 const COMPONENTS: [u64; 7] = [5120, 5121, 5122, 5123, 5125, 5126, 5130];
-const EXTENSIONS: [&str; 4] = ["KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_materials_unlit", "ACME_x"];
+const EXTENSIONS: [&str; 4] =
+    ["KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_materials_unlit", "ACME_x"];
 
 /// Choices of the fuzzer for one document, and the accessors so far.
 struct Maker<'a, 'b> {
@@ -154,7 +155,8 @@ impl Maker<'_, '_> {
         }
         let mut document = json!({
             "scenes": [{ "nodes": [0, self.number(n / 2)?] }], "nodes": nodes, "skins": [skin],
-            "meshes": [self.mesh()?], "materials": [{ "pbrMetallicRoughness": { "baseColorFactor": self.floats(4)? } }],
+            "meshes": [self.mesh()?],
+            "materials": [{ "pbrMetallicRoughness": { "baseColorFactor": self.floats(4)? } }],
             "buffers": [{}],
         });
         if self.is_so(16)? {
@@ -189,6 +191,7 @@ fuzz_target!(init: drop(std::panic::take_hook()), |bytes: &[u8]| {
         assert_eq!(loaded.file_face.len(), n_triangles);
         assert!(loaded.labellings.iter().all(|labelling| labelling.labels.len() == n_triangles));
         assert!(loaded.mesh.points.iter().all(|p| p.is_finite()));
-        assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < loaded.mesh.points.len()));
+        let n_points = loaded.mesh.points.len();
+        assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < n_points));
     }
 });

@@ -38,7 +38,8 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
         assert!(loaded.file_face.is_sorted());
         assert!(loaded.labellings.iter().all(|labelling| labelling.labels.len() == n_triangles));
         assert!(loaded.mesh.points.iter().all(|p| p.is_finite()));
-        assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < loaded.mesh.points.len()));
+        let n_points = loaded.mesh.points.len();
+        assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < n_points));
         assert!(!loaded.objects.is_empty() && loaded.cutters.is_empty());
     }
 });

@@ -19,14 +19,16 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     let (points, corners) = rest.split_at(rest.len().min(usize::from(n_points)));
     // Each axis has five steps; one bit of the byte adds a slight offset, which makes cracks.
     let coordinate = |step: u8, slack: u8| f64::from(step) + 1e-6 * f64::from(slack);
-    let point =
-        |&b: &u8| Vec3::new(coordinate(b % 5, b >> 7), coordinate(b / 5 % 5, 0), coordinate(b / 25 % 5, b >> 7));
+    let point = |&b: &u8| {
+        Vec3::new(coordinate(b % 5, b >> 7), coordinate(b / 5 % 5, 0), coordinate(b / 25 % 5, b >> 7))
+    };
     let points: Vec<Vec3> = points.iter().map(point).collect();
     let Ok(n) = u8::try_from(points.len()) else { return };
     if n == 0 {
         return;
     }
-    let triangles = corners.as_chunks::<3>().0.iter().map(|t| t.map(|corner| u32::from(corner % n))).collect();
+    let corners = corners.as_chunks::<3>().0.iter();
+    let triangles = corners.map(|t| t.map(|corner| u32::from(corner % n))).collect();
     let mesh = TriMesh { points, triangles };
     for inside_out in [InsideOut::Ask, InsideOut::Cut, InsideOut::Unite] {
         let Ok(repaired) = repair_as(&mesh, RepairMode::KeepLargest, inside_out) else { continue };

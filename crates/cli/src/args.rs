@@ -46,7 +46,7 @@ fn version() -> &'static str {
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
-    /// Print help
+    /// Print help with the options used most
     #[arg(short, long, global = true, action = ArgAction::HelpShort)]
     pub help: Option<bool>,
     /// Print help with every option, its range and what it is for
@@ -97,7 +97,7 @@ pub enum Command {
         model: PathBuf,
         #[command(flatten)]
         options: Options,
-        /// Where to write: a .ply, .3mf or .seg file
+        /// File to write, with the ending .ply, .3mf or .seg
         #[arg(short, long, value_name = "FILE")]
         out: PathBuf,
     },
@@ -146,12 +146,12 @@ pub enum Command {
     Batch(Box<BatchOptions>),
     /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
     Completions {
-        /// The shell
+        /// Shell that the completions are for
         shell: clap_complete::Shell,
     },
     /// Write manual pages, one a command
     Manual {
-        /// Folder for them
+        /// Folder to write the pages to
         folder: PathBuf,
     },
     /// Say what a file holds and whether it can be made
@@ -169,10 +169,10 @@ pub enum Command {
     Figure {
         /// Which: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         name: String,
-        /// Where to write: a .stl or .ply file
+        /// File to write, with the ending .stl or .ply
         #[arg(short, long, value_name = "FILE")]
         out: PathBuf,
-        /// Longest side, mm
+        /// Longest side of the figure, mm
         #[arg(long, default_value_t = 150.0, value_name = "MM", value_parser = units::length_mm)]
         size: f64,
         /// Also write the limb of each triangle there, for `build --labels` (fish and arms)
@@ -181,7 +181,7 @@ pub enum Command {
     },
 }
 
-/// Where the studio is, and what it opens.
+/// Model, project folder and port of the studio.
 #[derive(Args)]
 pub struct StudioOptions {
     /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface; it is copied into the project
@@ -305,7 +305,7 @@ pub struct BatchOptions {
     pub options: Options,
 }
 
-/// Where a kit goes.
+/// Folder that a kit is written to.
 #[derive(Args)]
 pub struct Out {
     /// Folder to write [default: the model's name with -kit; shellock-demo]
@@ -336,7 +336,8 @@ pub struct CouponOptions {
     #[arg(short, long, conflicts_with = "fits")]
     pub force: bool,
     /// The number whose parts fit; --printer is the one that the plate was made for
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=N_FITS as i64), requires = "save")]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=N_FITS as i64),
+          requires = "save")]
     pub fits: Option<u32>,
     /// Keep the clearances of that number in the configuration file, as a printer of this name
     #[arg(long, value_name = "NAME", requires = "fits")]
@@ -402,7 +403,7 @@ impl Unit {
     }
 }
 
-/// What the booklet is printed on.
+/// Paper size of the booklet.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum PaperSize {
     A4,
@@ -418,14 +419,14 @@ impl From<PaperSize> for Paper {
     }
 }
 
-/// What a body that is inside out and overlaps another is there for.
+/// Meaning of a body that is inside out and overlaps another.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum InsideOutMeans {
     /// Nobody knows: the model is refused
     Ask,
-    /// A hole
+    /// A hole in the body that it overlaps
     Cut,
-    /// A part
+    /// A part of the model, united with the body that it overlaps
     Unite,
 }
 
@@ -440,7 +441,7 @@ impl InsideOutMeans {
     }
 }
 
-/// What of a file is taken for labels.
+/// Data of a file that are taken as labels.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LabelsFrom {
     /// Labels of faces, or paint of a slicer
@@ -453,7 +454,7 @@ pub enum LabelsFrom {
     Colors,
     /// Materials (OBJ, 3MF, glTF)
     Materials,
-    /// Groups (OBJ)
+    /// Groups of faces (OBJ)
     Groups,
     /// Named sets of triangles (3MF)
     Sets,
@@ -463,7 +464,7 @@ pub enum LabelsFrom {
     None,
 }
 
-/// Where the wall's thickness comes from.
+/// Wall thickness: chosen automatically, or given in mm.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Thickness {
     Auto,

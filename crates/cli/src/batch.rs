@@ -194,7 +194,9 @@ fn told(session: &Session, options: &BatchOptions, records: &[Record]) {
         let all: BTreeMap<&str, usize> = Status::ALL.iter().map(|&s| (s.name(), n(s))).collect();
         println!(
             "{}",
-            json!({ "status": if verified == records.len() { "verified" } else { "failed" }, "models": records.len(), "by_status": all, "out": options.out, "exit_code": u8::from(verified < records.len()) })
+            json!({ "status": if verified == records.len() { "verified" } else { "failed" },
+                    "models": records.len(), "by_status": all, "out": options.out,
+                    "exit_code": u8::from(verified < records.len()) })
         );
     } else if session.shown == Shown::ForPeople {
         println!(

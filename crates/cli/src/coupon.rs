@@ -224,7 +224,8 @@ fn told(fit: &Fit) -> Value {
 
 fn tell_saved(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &str) {
     if session.is_json {
-        let value = json!({ "status": "done", "out": path, "printer": name, "based_on": base.name, "fits": told(fit) });
+        let value = json!({ "status": "done", "out": path, "printer": name, "based_on": base.name,
+                            "fits": told(fit) });
         println!("{value}");
     } else if session.shown != crate::progress::Shown::Nothing {
         println!(

@@ -149,11 +149,15 @@ fn told(
         |_| loaded.unit_mm.map(|mm| mm * loaded.bounds().size()),
         |m| Some(m.solid.mesh().bounds().size()),
     );
-    let mut value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
-        "size": loaded.bounds().size().to_array(), "unit_mm": loaded.unit_mm, "unit_is_stated": loaded.unit_is_stated,
-        "volume_mm3": model.as_ref().ok().map(|m| m.solid.volume()), "size_mm": size_mm.map(|size| size.to_array()), "objects": objects(loaded), "open_edges": found.edges.open.count,
+    let mut value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(),
+        "bodies": found.bodies.len(), "size": loaded.bounds().size().to_array(),
+        "unit_mm": loaded.unit_mm, "unit_is_stated": loaded.unit_is_stated,
+        "volume_mm3": model.as_ref().ok().map(|m| m.solid.volume()),
+        "size_mm": size_mm.map(|size| size.to_array()), "objects": objects(loaded),
+        "open_edges": found.edges.open.count,
         "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
-        "divided_by": labellings(loaded), "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": warnings,
+        "divided_by": labellings(loaded), "is_sound": is_sound,
+        "repairs": repairs, "notes": notes, "warnings": warnings,
         "can_be_made": model.is_ok(), "error": error });
     if let Some(division) = division {
         value["division"] = json!(division.figures);

@@ -161,7 +161,8 @@ pub fn command_line() -> ExitCode {
                 Some(code) => {
                     println!(
                         "{}",
-                        json!({ "status": "error", "error": failure.to_string(), "code": code, "exit_code": exit_code })
+                        json!({ "status": "error", "error": failure.to_string(), "code": code,
+                                "exit_code": exit_code })
                     );
                     ExitCode::from(exit_code)
                 }

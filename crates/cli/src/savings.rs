@@ -68,7 +68,8 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
     let told = json!({
-        "model": plan.input.as_ref().map(|input| &input.file), "pieces": pieces.len(), "wall_mm": plan.shell_thickness,
+        "model": plan.input.as_ref().map(|input| &input.file), "pieces": pieces.len(),
+        "wall_mm": plan.shell_thickness,
         "volume_ratio": volume / solid.volume(), "print_time": times,
     });
     let mut text = serde_json::to_string_pretty(&told).expect("numbers and strings can be written");
@@ -151,7 +152,8 @@ impl Costs {
         json!({ "by": self.by, "pieces_s": pieces.seconds, "solid_s": whole.seconds,
             "ratio": over(whole.seconds, pieces.seconds), "pieces_g": pieces.grams, "solid_g": whole.grams,
             "material_ratio": over(whole.grams, pieces.grams), "solid_as": whole_words(process),
-            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)), "note": self.note })
+            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)),
+            "note": self.note })
     }
 }
 

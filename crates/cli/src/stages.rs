@@ -100,7 +100,8 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         warnings.splice(0..0, model.warnings.iter().cloned());
     }
     if session.is_json {
-        let value = json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
+        let value = json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes,
+                            "warnings": warnings });
         println!("{value}");
     } else {
         notes.iter().for_each(|n| println!("note: {n}"));
@@ -182,7 +183,8 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
             .collect();
         println!(
             "{}",
-            json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof, "holding": holding, "bears": holding.summary(),
+            json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof,
+                    "holding": holding, "bears": holding.summary(),
                     "mean_cost": mean_cost, "n_plans": n_plans, "warnings": warnings })
         );
         return Ok(0);
@@ -242,7 +244,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     if session.is_json {
         println!(
             "{}",
-            json!({ "passed": verdict.passed(), "checks": verdict.checks, "findings": verdict.findings, "exit_code": code })
+            json!({ "passed": verdict.passed(), "checks": verdict.checks, "findings": verdict.findings,
+                    "exit_code": code })
         );
     } else {
         let up = plan.up.and_then(Axis::of);

@@ -116,44 +116,153 @@ type Twin = (&'static str, Vec<u8>, Outcome);
 /// Files that are broken or odd in their format.
 fn odd_files() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
-    let stl = write_stl_binary(&good);
-    let text = ascii_stl(&good);
+    let mut files = odd_stl_files(&good);
+    files.extend(odd_text_files(&good));
+    files.extend(odd_packages(&good));
+    files
+}
+
+/// STL files, empty files among them, and files whose names promise another format.
+fn odd_stl_files(good: &TriMesh) -> Vec<Twin> {
+    let stl = write_stl_binary(good);
+    let text = ascii_stl(good);
     let with = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut bytes = stl.clone();
         change(&mut bytes);
         bytes
     };
+    vec![
+        ("zero.stl", Vec::new(), Refused(&["empty"])),
+        ("good.stl", stl.clone(), Sound),
+        ("named.obj", stl.clone(), Sound),
+        (
+            "header_solid.stl",
+            with(&|b| b[..6].copy_from_slice(b"solid ")),
+            Sound,
+        ),
+        (
+            "cut.stl",
+            stl[..stl.len() / 2].to_vec(),
+            Refused(&["promises 512 triangles", "cut off"]),
+        ),
+        (
+            "nan.stl",
+            with(&|b| b[96..100].copy_from_slice(&f32::NAN.to_le_bytes())),
+            Refused(&["byte 96", "NaN"]),
+        ),
+        (
+            "normals.stl",
+            with(&|b| b[84..88].copy_from_slice(&9_f32.to_le_bytes())),
+            Sound,
+        ),
+        (
+            "upper.stl",
+            text.to_uppercase().replace('\n', "\r\n").into_bytes(),
+            Sound,
+        ),
+        ("no_extension", text.clone().into_bytes(), Sound),
+        (
+            "no_facet.stl",
+            b"solid x\nendsolid x\n".to_vec(),
+            Refused(&["no triangles"]),
+        ),
+    ]
+}
+
+/// Files in PLY, OBJ and OFF, in odd encodings, units and places.
+fn odd_text_files(good: &TriMesh) -> Vec<Twin> {
     let utf16 = |text: &str| {
         text.encode_utf16()
             .flat_map(u16::to_be_bytes)
             .collect::<Vec<u8>>()
     };
     vec![
-        ("zero.stl", Vec::new(), Refused(&["empty"])),
-        ("good.stl", stl.clone(), Sound),
-        ("named.obj", stl.clone(), Sound),
-        ("header_solid.stl", with(&|b| b[..6].copy_from_slice(b"solid ")), Sound),
-        ("cut.stl", stl[..stl.len() / 2].to_vec(), Refused(&["promises 512 triangles", "cut off"])),
-        ("nan.stl", with(&|b| b[96..100].copy_from_slice(&f32::NAN.to_le_bytes())), Refused(&["byte 96", "NaN"])),
-        ("normals.stl", with(&|b| b[84..88].copy_from_slice(&9_f32.to_le_bytes())), Sound),
-        ("upper.stl", text.to_uppercase().replace('\n', "\r\n").into_bytes(), Sound),
-        ("no_extension", text.clone().into_bytes(), Sound),
-        ("no_facet.stl", b"solid x\nendsolid x\n".to_vec(), Refused(&["no triangles"])),
-        ("points.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n".to_vec(), Refused(&["no triangles"])),
-        ("twice.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nelement vertex 9\nend_header\n".to_vec(), Refused(&["line 5"])),
-        ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 12\n".to_vec(), Refused(&["line 4", "12"])),
-        ("huge.off", b"OFF\n353535235358 6 0\n0 0 0\n".to_vec(), Refused(&["353535235358"])),
-        ("utf16.obj", utf16(&obj(&good)), Sound),
-        ("far.obj", obj(&scaled(&good, 1.0, Vec3::splat(1e9))).into_bytes(), Sound),
-        ("metres.ply", ply(&scaled(&good, 1e-3, Vec3::ZERO)), Sound),
-        ("inch.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), Sound),
-        ("mirror.3mf", package(&three_mf(&good, "", "<item objectid=\"1\" transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/>")), Sound),
-        ("missing.3mf", package(&three_mf(&good, "", "<item objectid=\"2\"/>")), Refused(&["object 2"])),
-        ("attribute.3mf", package(&three_mf(&good, "", "<item objectid=\"1\" objectid=\"1\"/>")), Refused(&["duplicated"])),
-        ("two.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/><item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>")), Refused(&["2 separate bodies", "--largest"])),
-        ("cycle.3mf", package(&three_mf(&good, "<object id=\"2\"><components><component objectid=\"2\"/></components></object>", "<item objectid=\"2\"/>")), Refused(&["contains itself"])),
-        ("damaged.3mf", package(&three_mf(&good, "", "")).into_iter().map(|b| if b == b'n' { b'm' } else { b }).collect(), Refused(&["damaged"])),
-        ("garbage.glb", b"glTF\x02\0\0\0garbage".to_vec(), Refused(&["cut off"])),
+        (
+            "points.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+              property float z\nend_header\n0 0 0\n"
+                .to_vec(),
+            Refused(&["no triangles"]),
+        ),
+        (
+            "twice.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nelement vertex 9\n\
+              end_header\n"
+                .to_vec(),
+            Refused(&["line 5"]),
+        ),
+        (
+            "index.obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 12\n".to_vec(),
+            Refused(&["line 4", "12"]),
+        ),
+        (
+            "huge.off",
+            b"OFF\n353535235358 6 0\n0 0 0\n".to_vec(),
+            Refused(&["353535235358"]),
+        ),
+        ("utf16.obj", utf16(&obj(good)), Sound),
+        (
+            "far.obj",
+            obj(&scaled(good, 1.0, Vec3::splat(1e9))).into_bytes(),
+            Sound,
+        ),
+        ("metres.ply", ply(&scaled(good, 1e-3, Vec3::ZERO)), Sound),
+    ]
+}
+
+/// Packages in 3MF and GLB with odd items, components and bytes.
+fn odd_packages(good: &TriMesh) -> Vec<Twin> {
+    let made_of = |more: &str, build: &str| package(&three_mf(good, more, build));
+    vec![
+        ("inch.3mf", made_of("", "<item objectid=\"1\"/>"), Sound),
+        (
+            "mirror.3mf",
+            made_of(
+                "",
+                "<item objectid=\"1\" transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/>",
+            ),
+            Sound,
+        ),
+        (
+            "missing.3mf",
+            made_of("", "<item objectid=\"2\"/>"),
+            Refused(&["object 2"]),
+        ),
+        (
+            "attribute.3mf",
+            made_of("", "<item objectid=\"1\" objectid=\"1\"/>"),
+            Refused(&["duplicated"]),
+        ),
+        (
+            "two.3mf",
+            made_of(
+                "",
+                "<item objectid=\"1\"/><item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>",
+            ),
+            Refused(&["2 separate bodies", "--largest"]),
+        ),
+        (
+            "cycle.3mf",
+            made_of(
+                "<object id=\"2\"><components><component objectid=\"2\"/></components></object>",
+                "<item objectid=\"2\"/>",
+            ),
+            Refused(&["contains itself"]),
+        ),
+        (
+            "damaged.3mf",
+            made_of("", "")
+                .into_iter()
+                .map(|b| if b == b'n' { b'm' } else { b })
+                .collect(),
+            Refused(&["damaged"]),
+        ),
+        (
+            "garbage.glb",
+            b"glTF\x02\0\0\0garbage".to_vec(),
+            Refused(&["cut off"]),
+        ),
     ]
 }
 

@@ -8,7 +8,7 @@ use shellock_testkit::golden::{self, Case, Ending, Goldens};
 
 use crate::failure::Failure;
 
-/// What is compared.
+/// Cases to compare, and the files of their digests.
 #[derive(Args)]
 pub struct Options {
     /// Write the digests anew instead of comparing

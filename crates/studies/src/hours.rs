@@ -36,7 +36,7 @@ const SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nskirts 
 /// Which kits, and what of them.
 #[derive(Args)]
 pub struct HoursOptions {
-    /// Folders of kits
+    /// Folders of finished kits to slice
     #[arg(required = true)]
     kits: Vec<PathBuf>,
     /// Slice the pieces alone and find coefficients, instead of comparing kits

@@ -35,7 +35,7 @@ pub struct MetricsOptions {
 pub struct SubjectOptions {
     #[command(flatten)]
     pub model: ModelOptions,
-    /// How many plans
+    /// Number of random plans to rate, 1 or more
     #[arg(long, default_value_t = 100, value_parser = at_least_one)]
     pub plans: usize,
     /// Length of triangle edges, 0.2 to 5; 1, which build uses, gives about 1000 points

@@ -40,11 +40,11 @@ pub struct ModelOptions {
 /// An axis of the file.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Axis {
-    /// The first coordinate.
+    /// First coordinate of the file.
     X,
-    /// The second.
+    /// Second coordinate of the file.
     Y,
-    /// The third.
+    /// Third coordinate of the file.
     Z,
 }
 

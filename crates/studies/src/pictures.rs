@@ -29,7 +29,7 @@ pub struct Options {
     /// Only pictures whose name has this in it
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
-    /// The repository
+    /// Root folder of the repository
     #[arg(long, value_name = "DIR", default_value = ".")]
     root: PathBuf,
 }

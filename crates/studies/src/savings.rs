@@ -15,7 +15,7 @@ pub struct Options {
     /// Folders of kits in which `shellock report` left its savings.json
     #[arg(required = true)]
     kits: Vec<PathBuf>,
-    /// Where to write: a Markdown file
+    /// Markdown file to write the table to
     #[arg(short, long, value_name = "FILE", default_value = "docs/guide/savings.md")]
     out: PathBuf,
 }
@@ -32,8 +32,9 @@ const HEAD: [&str; 9] = [
     "FDM, solid filled",
 ];
 
-const INTRODUCTION: &str = "# What kits save\n\nOf finished kits, as `shellock report` tells it: material and print time of all \
-     pieces over those of the solid model (the paper's Table 1 has 20 to 54 % and 23 to 69 %). Made by \
+const INTRODUCTION: &str = "# What kits save\n\nOf finished kits, as `shellock report` tells it: material \
+     and print time of all pieces over those of the solid model (the paper's Table 1 has 20 to 54 % and \
+     23 to 69 %). Made by \
      `cargo xtask savings KIT...`.\n\nPieces lie on plates as in `plates.3mf`, the whole model in its own \
      best pose, both with supports and the same settings. Resin printers with a display take the same time \
      for every layer, so there the height of the plates counts alone; filament printers pay for walls, and \

@@ -19,7 +19,7 @@ use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, wit
 use crate::study::{Sheet, write_all};
 use crate::table::{Table, markdown};
 
-/// Of which model.
+/// Model, divisions of it, and runs of the search.
 #[derive(Args)]
 pub struct SegmentationsOptions {
     #[command(flatten)]

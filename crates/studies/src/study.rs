@@ -19,7 +19,7 @@ use crate::strength::{self, StrengthOptions};
 use crate::table::{Table, markdown};
 use crate::worse::{self, WorseOptions};
 
-/// What to study and where the charts go.
+/// Study to run, and folder of its charts.
 #[derive(Args)]
 pub struct Options {
     #[command(subcommand)]
@@ -31,32 +31,32 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum Study {
-    /// How well the metrics agree on random plans of a model
+    /// Agreement of the metrics on random plans of a model
     Metrics(MetricsOptions),
-    /// What random plans of a model bear, load by load, by the surface model and by the solid one
+    /// Load factors of random plans of a model, load by load, by the surface model and by the solid one
     Loads(LoadsOptions),
-    /// Whether half connectors and plans of half the score are worse under a punch and in a fall
+    /// Comparison with half connectors and with plans of half the score, under a punch and in a fall
     Worse(WorseOptions),
-    /// How fast plans of a model are found, and what its segmentations allow
+    /// Speed of the search for plans of a model, and the plans that its segmentations allow
     Search(SearchOptions),
-    /// What the divisions of a model by each method allow: plan, seams, time
+    /// Comparison of a model's divisions by each method: plan, seams, time
     Segmentations(SegmentationsOptions),
-    /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
+    /// Influences on the thickness of a model's wall: analysis mesh, peaks, falls
     Strength(StrengthOptions),
-    /// What kits of many models cost: time by stage, kits made in vain
+    /// Effort for kits of many models: time by stage, kits made in vain
     Effort(EffortOptions),
-    /// How well print time and plastic by closed forms agree with PrusaSlicer's, on kits or on their pieces
+    /// Agreement of print time and plastic by closed forms with PrusaSlicer's, on kits or on their pieces
     Hours(HoursOptions),
-    /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a
-    /// row for each plan; the first column is the metric that the others are compared with
+    /// Agreement of metrics: CSV with a column of scores for each metric, "name" or "name [unit]", and a row
+    /// for each plan; the first column is the metric that the others are compared with
     Scores {
-        /// The CSV file
+        /// CSV file with the scores
         file: PathBuf,
     },
-    /// How fast searches get better: CSV with the columns variant, seed, seconds and score, a row for each
+    /// Progress of searches over time: CSV with the columns variant, seed, seconds and score, a row for each
     /// improvement
     Convergence {
-        /// The CSV file
+        /// CSV file with the improvements
         file: PathBuf,
         /// Score that is proven to be the best, drawn as a line
         #[arg(long, allow_hyphen_values = true)]

@@ -7,27 +7,29 @@ use super::Axis;
 use crate::stress;
 use crate::units;
 
-/// Where a punch lands.
+/// Place that the punch presses on.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Place {
     Top,
     Middle,
 }
 
-/// What is done to a kit.
+/// Loads that a finished kit is tested with, and settings of the simulation.
 #[derive(Args)]
 pub struct Blows {
     /// Force of the punch
-    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = units::newtons)]
+    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true,
+          value_parser = units::newtons)]
     pub punch: f64,
-    /// Where it presses: on the highest place 15 mm wide or wider, or on the highest place above the middle
+    /// Place that the punch presses on: the highest place 15 mm wide or wider (top), or the highest place
+    /// above the middle (middle)
     #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
     pub at: Place,
     /// Height of the fall: m, cm or mm
     #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
           value_parser = units::metres)]
     pub drop: f64,
-    /// What the pieces are printed of: sla-resin, pla, petg or pa12 [default: as the kit was built]
+    /// Material of the pieces: sla-resin, pla, petg or pa12 [default: as the kit was built]
     #[arg(long, value_name = "NAME", value_parser = stress::material)]
     pub material: Option<Material>,
     /// Edge of the cells that finished pieces are cut into, mm, 0.5 to 20; smaller ones take longer and more

@@ -22,8 +22,8 @@ use crate::{stress, units};
 pub struct Options {
     /// sla, fdm, fdm-petg, sls, or a printer of your own
     ///
-    /// What it is printed on: sla, fdm, fdm-petg, sls, or a printer of the configuration file; its
-    /// clearances, walls and material are used where nothing else is said
+    /// Printer that the kit is made for: sla, fdm, fdm-petg, sls, or a printer of the configuration file;
+    /// its clearances, walls and material are used where nothing else is said
     #[arg(long, value_name = "NAME", default_value = "sla", help_heading = "Printer")]
     pub printer: String,
     /// Options and printers, in TOML
@@ -35,13 +35,19 @@ pub struct Options {
     /// The printers of the configuration file.
     #[arg(skip)]
     pub own_printers: Vec<Printer>,
-    /// What the model's file must hash to, as a project says.
+    /// SHA-256 that the model's file must have, as recorded in a project.
     #[arg(skip)]
     pub model_sha256: Option<String>,
     /// Longest side of the made thing
     ///
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
-    #[arg(value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with_all = ["height", "scale"])]
+    #[arg(value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Size",
+        conflicts_with_all = ["height", "scale"]
+    )]
     pub size: Option<f64>,
     /// Height of the made thing along --up
     ///
@@ -69,7 +75,13 @@ pub struct Options {
     ///
     /// Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that gives a
     /// sensible size]
-    #[arg(hide_possible_values = true, long, value_enum, help_heading = "Size", conflicts_with_all = ["size", "height", "scale"])]
+    #[arg(
+        hide_possible_values = true,
+        long,
+        value_enum,
+        help_heading = "Size",
+        conflicts_with_all = ["size", "height", "scale"]
+    )]
     pub unit: Option<Unit>,
     /// Axis of the file that points up: x, y or z
     ///
@@ -102,9 +114,9 @@ pub struct Options {
         conflicts_with = "largest"
     )]
     pub no_repair: bool,
-    /// Of several bodies make the largest
+    /// Make only the largest of several bodies
     ///
-    /// Of several bodies apart from each other make the largest
+    /// Make only the largest of several bodies that lie apart from each other
     #[arg(long, help_heading = "Surface")]
     pub largest: bool,
     /// Close a hollow model's openings: it is made solid
@@ -115,8 +127,8 @@ pub struct Options {
     pub fill: bool,
     /// A body inside out that overlaps another: ask, cut or unite
     ///
-    /// What a body is there for that is inside out and overlaps another: ask, the model is refused with its
-    /// place; cut, a hole; unite, a part
+    /// Meaning of a body that is inside out and overlaps another: ask, the model is refused and the body's
+    /// place is named; cut, it is a hole; unite, it is a part
     #[arg(
         hide_short_help = true,
         hide_possible_values = true,
@@ -145,9 +157,9 @@ pub struct Options {
     /// piece
     #[arg(long, value_name = "FILE", help_heading = "Pieces")]
     pub labels: Option<PathBuf>,
-    /// What of the file divides it: labels, paint, colors …
+    /// Source of the division: labels, paint, colors …
     ///
-    /// What of the model's own file divides it into pieces
+    /// Data in the model's own file that divide it into pieces
     #[arg(
         hide_possible_values = true,
         long,
@@ -168,7 +180,8 @@ pub struct Options {
         long,
         value_name = "METHOD",
         default_value = Method::default().name(),
-        value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name)).map(|name| Method::named(&name).expect("it is one of all")),
+        value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name))
+            .map(|name| Method::named(&name).expect("it is one of all")),
         help_heading = "Pieces"
     )]
     pub method: Method,
@@ -284,12 +297,22 @@ pub struct Options {
     ///
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for
     /// filament [default: the printer's]
-    #[arg(value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    #[arg(value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Make"
+    )]
     pub clearance: Option<f64>,
     /// Gap on the key's rails, mm [default: printer's]
     ///
-    /// The same on the rails of the key, mm, 0.03 to 0.8 [default: the printer's]
-    #[arg(hide_short_help = true, value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    /// Gap between mating faces of the key's rails, mm, 0.03 to 0.8 [default: the printer's]
+    #[arg(hide_short_help = true, value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Make"
+    )]
     pub key_clearance: Option<f64>,
     /// Bump that the key clicks past, 0 to 0.4 mm
     ///
@@ -305,7 +328,13 @@ pub struct Options {
     /// How far ribs press on a key without rails, mm
     ///
     /// How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 makes none
-    #[arg(hide_short_help = true, value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_rib_mm, help_heading = "Make")]
+    #[arg(hide_short_help = true, value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        default_value_t = Params::default().connector.key_rib_mm,
+        help_heading = "Make"
+    )]
     pub key_ribs: f64,
     /// Also prove how far pieces move all together
     ///
@@ -360,12 +389,22 @@ pub struct Options {
     ///
     /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the
     /// printer's]
-    #[arg(hide_short_help = true, value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    #[arg(hide_short_help = true, value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Make"
+    )]
     pub min_wall: Option<f64>,
     /// Spacing of the grid behind the walls, mm
     ///
     /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
-    #[arg(hide_short_help = true, value_parser = units::length_mm, long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    #[arg(hide_short_help = true, value_parser = units::length_mm,
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Make"
+    )]
     pub grid: Option<f64>,
     /// Seed of all random choices
     ///

@@ -37,7 +37,7 @@ impl FromStr for Pieces {
     }
 }
 
-/// Whether both sides are divided alike.
+/// Choice to divide both sides of a model alike.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Symmetric {
     On,

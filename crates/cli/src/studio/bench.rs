@@ -321,18 +321,20 @@ impl Workshop for Bench {
             let finer = state.model.as_ref().and_then(|of| finer::note(&of.file));
             let notes: Vec<String> = finer.into_iter().chain(model.notes.clone()).collect();
             let size = standing(state.options.up, model.solid.mesh().bounds().size()).abs();
-            json!({ "name": model.name, "n_triangles": figure.n_faces(), "size_mm": size.to_array(), "notes": notes,
-                "warnings": figure.warnings, "thin_share": figure.thin_share(), "view_triangles": figure.n_faces(),
-                "is_exact": figure.is_exact() })
+            json!({ "name": model.name, "n_triangles": figure.n_faces(), "size_mm": size.to_array(),
+                "notes": notes, "warnings": figure.warnings, "thin_share": figure.thin_share(),
+                "view_triangles": figure.n_faces(), "is_exact": figure.is_exact() })
         });
         let division = state.pieces.as_ref().map(|pieces| {
             let origin = if pieces.is_painted { "painted" } else { "automatic" };
-            json!({ "n_pieces": pieces.n(), "origin": origin, "method": state.options.method.name(), "notes": pieces.notes })
+            json!({ "n_pieces": pieces.n(), "origin": origin, "method": state.options.method.name(),
+                "notes": pieces.notes })
         });
         let figures = Sample::ALL.map(|figure| figure.name());
-        json!({ "name": self.store.folder().file_name().map(|n| n.to_string_lossy()), "folder": self.store.folder(),
-            "revision": state.revision, "is_opening": state.is_opening, "problem": state.problem, "model": model,
-            "division": division, "kit": self.store.kit(), "figures": figures, "program": env!("CARGO_PKG_VERSION") })
+        json!({ "name": self.store.folder().file_name().map(|n| n.to_string_lossy()),
+            "folder": self.store.folder(), "revision": state.revision, "is_opening": state.is_opening,
+            "problem": state.problem, "model": model, "division": division, "kit": self.store.kit(),
+            "figures": figures, "program": env!("CARGO_PKG_VERSION") })
     }
 
     fn options(&self) -> Value {

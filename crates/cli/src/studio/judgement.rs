@@ -147,7 +147,8 @@ impl View<'_> {
                     None => format!("piece {}", order.last().map_or(0, |label| label + 1)),
                 };
                 let words = format!("It locks: {} pieces, the key is {key}.", surface.n_patches);
-                json!({ "locks": true, "words": words, "n_pieces": n_mended, "order": order, "ways": ways, "blockers": [] })
+                json!({ "locks": true, "words": words, "n_pieces": n_mended, "order": order, "ways": ways,
+                    "blockers": [] })
             }
             Verdict::Blocked {
                 reason,
@@ -169,15 +170,16 @@ impl View<'_> {
                     })
                     .collect();
                 let words = format!("It does not lock yet: {reason}");
-                json!({ "locks": false, "words": words, "n_pieces": n_mended, "order": [], "ways": [], "blockers": blockers })
+                json!({ "locks": false, "words": words, "n_pieces": n_mended, "order": [], "ways": [],
+                    "blockers": blockers })
             }
         }
     }
 
     fn advice(&self, warning: &Warning, labels: &[u32]) -> Value {
         let number = |p: PatchId| labels.get(usize::from(p)).copied().unwrap_or_default();
-        json!({ "severity": warning.severity(), "words": advice::words(warning, number), "at": warning.at.map(|at| self.at(at)),
-            "mends": advice::is_mended(warning) })
+        json!({ "severity": warning.severity(), "words": advice::words(warning, number),
+            "at": warning.at.map(|at| self.at(at)), "mends": advice::is_mended(warning) })
     }
 
     /// Smooth lines between the pieces, as JSON.
@@ -220,8 +222,8 @@ impl View<'_> {
             100.0 * site.flat_share
         );
         json!({ "at": self.at(prism.middle().to_array()), "slide": self.at(prism.slide.to_array()),
-            "normal": self.at(prism.normal.to_array()), "outline": outline, "area_mm2": site.area_mm2, "score": site.score,
-            "words": words, "is_chosen": is_chosen })
+            "normal": self.at(prism.normal.to_array()), "outline": outline, "area_mm2": site.area_mm2,
+            "score": site.score, "words": words, "is_chosen": is_chosen })
     }
 }
 
@@ -252,7 +254,8 @@ fn told_pieces(
         let middle = middle(mesh, &faces);
         let fits_bed = is_small || fits(&printer, &shell_of(&surface, PatchId(piece), wall_mm));
         let mut say = |severity: Severity, words: String| {
-            advice.push(json!({ "severity": severity, "words": words, "at": view.at(middle.to_array()), "mends": false }));
+            let at = view.at(middle.to_array());
+            advice.push(json!({ "severity": severity, "words": words, "at": at, "mends": false }));
         };
         if !fits_bed {
             let words = format!(

@@ -21,8 +21,8 @@ impl Glb {
     /// Creates a file with a mesh in metres, shown by node 0.
     fn of(mesh: &TriMesh) -> Self {
         let mut glb = Self {
-            json: json!({ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-                "accessors": [], "bufferViews": [] }),
+            json: json!({ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+                "nodes": [{ "mesh": 0 }], "accessors": [], "bufferViews": [] }),
             data: Vec::new(),
         };
         let points: Vec<f32> = mesh
