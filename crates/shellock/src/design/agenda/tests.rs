@@ -1,5 +1,4 @@
-//! Order of trials, in histories that are made up: `order.txt` lists them, and is written anew with
-//! `UPDATE_ORDER=1`.
+//! Order of trials in histories that are made up; `order.txt` has all of them.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -215,16 +214,10 @@ fn trials_come_in_the_order_that_is_on_record() {
         }
         text.push('\n');
     }
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/design/agenda/order.txt");
-    if std::env::var_os("UPDATE_ORDER").is_some() {
-        std::fs::write(file, &text).expect("the file can be written");
-    }
-    let on_record = std::fs::read_to_string(file)
-        .unwrap_or_default()
-        .replace('\r', "");
+    let on_record = include_str!("order.txt").replace('\r', "");
     assert!(
         text == on_record,
-        "the order differs from {file}; UPDATE_ORDER=1 writes it anew:\n{text}"
+        "the order differs from agenda/order.txt; if that is meant, this is the new text:\n{text}"
     );
 }
 
