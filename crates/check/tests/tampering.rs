@@ -118,10 +118,11 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     };
     let certificate = certify(named, &pieces, &plan, &evidence, CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
-        json!({ "file": format!("{}.stl", usize::from(s.piece)), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
+        let along = (-s.separation.unit() + 0.0).to_array();
+        json!({ "file": format!("{}.stl", usize::from(s.piece)), "installation_direction": along })
     });
-    let plan = json!({ "version": 2, "key_piece": 3, "installation_order": [1, 2, 3], "clearance": CLEARANCE_MM,
-                       "pieces": pieces.collect::<Vec<_>>() });
+    let plan = json!({ "version": 2, "key_piece": 3, "installation_order": [1, 2, 3],
+                       "clearance": CLEARANCE_MM, "pieces": pieces.collect::<Vec<_>>() });
     let mut certificate = serde_json::to_value(certificate).unwrap();
     // Gaps are visible from outside, which does not matter here.
     certificate["failed"] = json!([]);

@@ -163,9 +163,9 @@ fn explore<'a, T>(
 /// as they are installed.
 #[non_exhaustive]
 pub struct Planned {
-    /// The pieces.
+    /// Surface divided into pieces.
     pub surface: SegmentedSurface,
-    /// Order and directions.
+    /// Order and directions of installation.
     pub plan: InstallationPlan,
     /// Bound of its cost.
     pub proof: PlanProof,

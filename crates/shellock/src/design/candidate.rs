@@ -155,7 +155,7 @@ impl CutKey {
 
     /// Returns a notch across the key, nearer to its front.
     fn grip(&self, key: PatchId) -> Grip {
-        /// Of its length.
+        /// Share of the key's length.
         const FROM_BACK: f64 = 0.65;
         let prism = self.site.prism;
         let KeyPrism {

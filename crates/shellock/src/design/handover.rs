@@ -21,7 +21,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(super) struct Handover {
     back: Turn,
-    /// Of each patch of the division, the piece of the kit.
+    /// Piece of the kit for each patch of the division.
     pieces: IdVec<PatchId, PatchId>,
     /// The plan as it was found.
     plan: LatticePlan,

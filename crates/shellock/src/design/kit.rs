@@ -29,13 +29,13 @@ pub struct Kit {
     pub surface: SegmentedSurface,
     /// Connector sizes of its pairs of pieces.
     pub sizes: ConnectorSizes,
-    /// Order and directions.
+    /// Order and directions of installation.
     pub plan: InstallationPlan,
     /// How good the plan is.
     pub proof: PlanProof,
-    /// How it holds by simulation, and where it is weak.
+    /// Simulated resistance to separation, and the weak places.
     pub holding: Holding,
-    /// How its pieces move under what it is told to bear.
+    /// Motion of the pieces under the loads that are reported.
     pub deformed: Deformed,
     /// Thickness of its walls, mm.
     pub thickness_mm: f64,
@@ -43,21 +43,21 @@ pub struct Kit {
     pub pieces: IdVec<PatchId, TriMesh>,
     /// Connector runs and how they came out.
     pub joints: Vec<FinishedJoint>,
-    /// What clicks on the key's way in.
+    /// Press fits that the key passes on its way in.
     pub press_fits: Vec<PressFit>,
-    /// What the seams offered.
+    /// Room for connectors along the seams.
     pub contacts: Vec<SeamRoom>,
     /// The verdict on the finished meshes.
     pub verification: Verification,
-    /// Where the finished pieces touch.
+    /// Contacts of the finished pieces.
     pub touching: Vec<verify::contact::Contact>,
-    /// How far the finished pieces move within their gaps.
+    /// Play of the finished pieces within their gaps.
     pub play: KitPlay,
     /// The pieces that rattle, the loosest first.
     pub rattles: Vec<Rattle>,
-    /// What its stages warned of.
+    /// Warnings of the stages.
     pub warnings: Vec<Warning>,
-    /// Which patches its pieces were made of.
+    /// Patches that the pieces were made of.
     pub(super) handover: Handover,
 }
 
@@ -71,7 +71,7 @@ impl Kit {
             .fold(0.0, |sum, mm| sum + mm)
     }
 
-    /// Names of the checks that it fails.
+    /// Returns the names of the checks that fail.
     pub fn failures(&self) -> Vec<String> {
         self.verification
             .checks
@@ -81,12 +81,12 @@ impl Kit {
             .collect()
     }
 
-    /// Whether it passed and no piece rattles.
+    /// Returns true if the kit passed and no piece rattles.
     pub fn is_firm(&self) -> bool {
         self.verification.passed() && self.rattles.is_empty()
     }
 
-    /// Whether the only thing wrong with it is that pieces rattle, be they loose or not.
+    /// Returns true if rattling is the only fault, loose or not.
     pub fn only_rattles(&self) -> bool {
         let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
         let n_failures = self.failures().len();
@@ -95,8 +95,8 @@ impl Kit {
         is_all && !self.rattles.is_empty()
     }
 
-    /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left
-    /// out.
+    /// Returns the pieces that rattle, the loosest first. The key is left out, since it is cut where there is
+    /// room for it.
     pub fn rattling(&self) -> Vec<PatchId> {
         let pieces = self.rattles.iter().map(|r| r.piece);
         pieces.filter(|piece| *piece != self.plan.key()).collect()
@@ -114,7 +114,7 @@ impl Kit {
     }
 }
 
-/// What a kit is made of, each from an earlier stage.
+/// Input of a kit, each part from an earlier stage.
 pub(super) struct Recipe<'a> {
     pub params: &'a Params,
     pub division: &'a Division,
@@ -199,7 +199,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     })
 }
 
-/// Where connectors run, and what the seams offered.
+/// Lays out the runs of connectors, and measures the room along the seams.
 fn connectors(
     settings: &Settings,
     sizes: &ConnectorSizes,
@@ -227,7 +227,7 @@ fn connectors(
     }
 }
 
-/// What finished meshes are worth.
+/// Judgement on the finished meshes.
 struct Judged {
     verification: Verification,
     touching: Vec<verify::contact::Contact>,
@@ -235,7 +235,7 @@ struct Judged {
     rattles: Vec<Rattle>,
 }
 
-/// What the meshes are worth: the verdict with that on play, where they touch, and how far they move.
+/// Judges the meshes: verdict, contacts, play, and ways out.
 fn judged(
     ctx: &Ctx,
     settings: &Settings,

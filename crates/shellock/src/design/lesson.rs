@@ -1,4 +1,4 @@
-//! What a finished kit that failed its verification teaches the next round.
+//! Lessons of a kit that failed its verification, for the next plan.
 
 use std::collections::BTreeMap;
 
@@ -11,20 +11,20 @@ use crate::seam::rules::SHORTEST_RUN_SIZES;
 use crate::verify::Finding;
 use crate::{LatticeDirection, PatchId};
 
-/// One thing learned.
+/// Lesson of a kit or plan that failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lesson {
     /// Connectors came out too short to hold.
     WeakJoints(Vec<WeakJoint>),
     /// A piece rubs on its way along a direction.
     RubbingPath {
-        /// The piece.
+        /// Piece that the lesson is about.
         piece: PatchId,
-        /// The direction.
+        /// Direction in which it leaves.
         separation: LatticeDirection,
-        /// The earlier piece that is worst in its way.
+        /// Earlier piece that blocks it most.
         against: PatchId,
-        /// How far from its place, mm.
+        /// Distance from its place, mm.
         travel_mm: f64,
         /// Mean thickness of the overlap, mm.
         thickness_mm: f64,
@@ -33,39 +33,39 @@ pub enum Lesson {
     },
     /// A piece would have to leave most of its wall behind.
     Blocked {
-        /// The piece.
+        /// Piece that the lesson is about.
         piece: PatchId,
-        /// Its direction.
+        /// Direction in which it leaves.
         separation: LatticeDirection,
         /// Share of its wall that it could take along, in [0, 1].
         kept: f64,
     },
     /// A piece lost outer surface to what it passes on its way along a direction.
     SkinLost {
-        /// The piece.
+        /// Piece that the lesson is about.
         piece: PatchId,
-        /// The direction.
+        /// Direction in which it leaves.
         separation: LatticeDirection,
-        /// Where the hole is deepest.
+        /// Place where the hole is deepest.
         at: Vec3,
     },
     /// The plan as a whole failed.
     FailedPlan {
-        /// The plan.
+        /// Plan that must not be made again.
         plan: LatticePlan,
         /// Pieces that were loose or moved.
         loose: Vec<PatchId>,
     },
 }
 
-/// What two pieces hold each other by is too little, where the later one leaves along this direction.
+/// Pair of pieces whose connectors are too short if the later one leaves in this direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeakJoint {
-    /// The piece installed later.
+    /// Piece that is installed later.
     pub later: PatchId,
-    /// The piece installed earlier.
+    /// Piece that is installed earlier.
     pub earlier: PatchId,
-    /// The later piece's direction.
+    /// Direction in which the later piece leaves.
     pub separation: LatticeDirection,
     /// Length of their connectors, mm.
     pub length_mm: f64,
@@ -74,7 +74,7 @@ pub struct WeakJoint {
 }
 
 impl Lesson {
-    /// Adds what was learned to what plans must respect.
+    /// Adds the lesson to the constraints that plans must respect.
     pub fn teach(&self, constraints: &mut PlanConstraints) {
         match self {
             Self::WeakJoints(joints) => {
@@ -103,7 +103,7 @@ impl Lesson {
         }
     }
 
-    /// The pieces whose division may help.
+    /// Returns the pieces whose division may help.
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
             Self::WeakJoints(_) => Vec::new(),
@@ -116,7 +116,7 @@ impl Lesson {
 }
 
 impl Lesson {
-    /// The pieces that came out loose.
+    /// Returns the pieces that came out loose.
     pub fn loose(&self) -> Vec<PatchId> {
         if let Self::FailedPlan { loose, .. } = self {
             loose.clone()
@@ -187,8 +187,8 @@ impl std::fmt::Display for Lesson {
     }
 }
 
-/// The lessons of a kit for the division that it was made of, told by its patches; none where it passed. The
-/// last one always rules this plan out.
+/// Derives the lessons of a kit for the patches of the division that it was made of; none if it passed. The
+/// last lesson always rules out the kit's plan.
 pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     if kit.verification.passed() {
         return Vec::new();
@@ -249,13 +249,13 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     learned
 }
 
-/// The piece that has the outer surface at a place.
+/// Returns the piece with the outer surface at a place.
 fn patch_at(kit: &Kit, at: Vec3) -> PatchId {
     let nearest = TriangleBvh::new(&kit.surface.mesh).nearest(at, f64::INFINITY);
     kit.surface.patch_of_face[nearest.expect("a surface has triangles").face as usize]
 }
 
-/// Pairs whose connectors are too short: they must not be counted on again in this way.
+/// Returns the pairs whose connectors are too short, so that no plan counts on them again in this way.
 fn weak_joints(kit: &Kit) -> Option<Lesson> {
     let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
     let by_order = |a: PatchId, b: PatchId| {

@@ -33,21 +33,21 @@ pub struct Design {
     pub settings: Settings,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
-    /// What the wall bears; `None` where the stress could not be computed, which is warned of.
+    /// Strength of the wall; `None` if the stress could not be computed, of which a warning tells.
     pub strength: Option<Strength>,
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
     /// How far faces may stand out as they are printed, and what becomes of the play where they stand back.
     pub fit: PrintedFit,
-    /// Where each piece is too thin to print well, the longest place first.
+    /// Places of each piece that are too thin to print well, the longest first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
     /// Cost of the whole job, with all that was tried in vain.
     pub effort: Effort,
-    /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
+    /// Warnings about this kit; those of kits that were given up are dropped.
     pub warnings: Vec<Warning>,
 }
 
-/// What a printer's error does to a kit.
+/// Effect of a printer's error on a kit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PrintedFit {
     /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces,
@@ -65,7 +65,7 @@ pub enum DesignOutcome {
     Made(Box<Design>),
     /// No plan was found for any division that was tried.
     NoPlan {
-        /// Reason, for people.
+        /// Reason in words for people.
         reason: String,
         /// Pieces that are in the way of others.
         blockers: Vec<Blocker>,
@@ -78,7 +78,7 @@ pub enum DesignOutcome {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct NoPlan {
-    /// Reason, for people.
+    /// Reason in words for people.
     pub reason: String,
     /// True if the time was over before all was tried: with more of it one may be found.
     pub is_cut_short: bool,
@@ -544,7 +544,7 @@ from_stage! {
     PieceError => Piece,
 }
 
-/// What is wrong with a kit that fails these checks, in words: each once.
+/// Describes the faults of a kit that fails these checks, each once.
 fn plainly(checks: &[String]) -> String {
     let mut words: Vec<&str> = Vec::new();
     for check in checks {

@@ -33,14 +33,14 @@ pub enum Verdict {
     Locks {
         /// The pieces with the key, numbered as they are installed.
         surface: SegmentedSurface,
-        /// Order and directions.
+        /// Order and directions of installation.
         plan: InstallationPlan,
         /// Site of the key; `None` if it is one of the pieces.
         key: Option<KeySite>,
     },
     /// No plan was found.
     Blocked {
-        /// Reason, for people.
+        /// Reason in words for people.
         reason: String,
         /// Pieces that are in the way of others: ids of `surface`.
         blockers: Vec<Blocker>,
@@ -187,7 +187,7 @@ mod tests {
         params
     }
 
-    /// Whether it locks, and what it says.
+    /// Returns whether it locks, and the number of its pieces.
     fn told(outlook: &Outlook) -> (bool, usize) {
         match &outlook.verdict {
             Verdict::Locks { surface, plan, .. } => {

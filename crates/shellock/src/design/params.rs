@@ -1,4 +1,4 @@
-//! What a user may set.
+//! Parameters that a user may set.
 
 use shellock_mechanics::Material;
 
@@ -19,43 +19,43 @@ use crate::segmentation::{KeepWhole, Method};
 pub struct Params {
     /// Seed of all random choices: the same seed gives the same kit. 0.
     pub seed: u64,
-    /// How pieces are found where there are no labels; where people would divide ([`Method::Auto`]).
+    /// Method that divides a model without labels; [`Method::Auto`], which cuts where people would.
     pub method: Method,
-    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in
-    /// creases from the area, 10 for a figure of 150 mm.
+    /// Number of pieces that automatic segmentation begins with. [2, 128]; `None`: the method's choice, or by
+    /// the area with [`Method::Creases`], 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
     /// Regions that no seam is to divide; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry
-    /// alike; no.
+    /// True to divide both sides of a model's plane of symmetry alike, by [`Method::Auto`] and
+    /// [`Method::RandomCuts`]; false.
     pub symmetric: bool,
-    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    /// Upward direction of the standing model; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
-    /// Where the wall's thickness comes from; 2 mm.
+    /// Source of the wall's thickness; 2 mm.
     pub thickness: Thickness,
-    /// What pieces are printed of.
+    /// Material that pieces are printed of.
     pub material: Material,
     /// Height of the fall that the wall is to bear, m. [0.01, 20]; 1.275.
     pub drop_m: f64,
-    /// Where the key comes from.
+    /// Source of the key; cut out of the surface.
     pub key: KeySource,
-    /// Whether a key that is cut gets a notch for a fingernail.
+    /// True to cut a notch for a fingernail into a key that is cut; false.
     pub has_grip: bool,
-    /// How the pieces' numbers are engraved; not at all where `None`.
+    /// Engraving of the pieces' numbers; `None` for no numbers.
     pub label: Option<LabelParams>,
-    /// How connectors are made.
+    /// Shape and clearance of connectors.
     pub connector: ConnectorParams,
-    /// How far each side of a seam stays back, mm. [0, 0.4]; 0.05.
+    /// Distance by which each side of a seam is set back, mm. [0, 0.4]; 0.05.
     pub seam_gap_mm: f64,
     /// Spacing of the grid that fields live on, mm. (0, thickness / 2]; `None` takes the thickness over 2.5.
     pub cell_mm: Option<f64>,
     /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
     pub proof_budget: usize,
-    /// Whether pieces are made though hardly anything of the model can be hollow.
+    /// True to make pieces even if little of the model can be hollow; false.
     pub allows_thin: bool,
-    /// Whether the play of all pieces together is looked for, too.
+    /// True to search for the play of all pieces together, too; false.
     pub is_play_together: bool,
-    /// How often a kit that failed its verification is planned and made again.
+    /// Bounds on the kits that are made after one fails its verification.
     pub rounds: Rounds,
 }
 
@@ -86,18 +86,18 @@ impl Default for Params {
 }
 
 impl Params {
-    /// Every problem of every stage, in words; empty where there is none.
+    /// Lists the problems of all stages, in words; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         super::settings::problems(self)
     }
 }
 
-/// Where the wall's thickness comes from.
+/// Source of the wall's thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
-    /// It is so much, mm, in [0.8, 10]; the stress in it is reported.
+    /// Thickness given by the user, mm, in [0.8, 10]; its stress is reported.
     Mm(f64),
-    /// The least that bears a fall.
+    /// Least thickness that withstands a fall.
     Auto,
 }
 
@@ -107,16 +107,16 @@ impl Default for Thickness {
     }
 }
 
-/// Where the key comes from.
+/// Source of the key.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
-    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as
-    /// with `Flattest`.
+    /// Cut out of the surface where the key slides best, see [`crate::key`]; if no such kit passes, as with
+    /// `Flattest`.
     #[default]
     Cut,
-    /// The same as near as can be to a place in the model's space, mm.
+    /// Cut as near as possible to a place in the model's space, mm.
     CutNear([f64; 3]),
-    /// The flattest piece that works.
+    /// Flattest of the pieces that work as the key.
     Flattest,
     /// The piece with this label, where labels are given; else the one that has this number, from 1, once the
     /// model is divided (as `shellock segment` numbers them).
@@ -124,13 +124,13 @@ pub enum KeySource {
 }
 
 impl KeySource {
-    /// Whether the key is cut out of the surface.
+    /// Returns true if the key is cut out of the surface.
     pub fn is_cut(self) -> bool {
         matches!(self, Self::Cut | Self::CutNear(_))
     }
 }
 
-/// Bounds of the feedback loop.
+/// Bounds on the kits of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
     /// Kits made for one segmentation, at most. ≥ 1; 3.
@@ -142,7 +142,7 @@ pub struct Rounds {
 }
 
 impl Rounds {
-    /// No more of anything than `other` allows.
+    /// Returns the smaller bound of `self` and `other`, each by itself.
     pub fn least(&self, other: &Self) -> Self {
         Self {
             kits: self.kits.min(other.kits),

@@ -1,4 +1,4 @@
-//! What stages are given, resolved once from what the user set and from what the wall must bear.
+//! Settings of the stages, resolved once from the user's parameters and the strength of the wall.
 
 use super::{Params, Thickness};
 use crate::body::BodyParams;
@@ -12,31 +12,31 @@ use crate::strength::StrengthParams;
 use crate::verify::VerifyParams;
 use crate::{LatticeDirection, PatchId};
 
-/// The parameters of each stage. Nothing changes them on the way; a kit with a key that is cut has some of
-/// its own, see `with_key`.
+/// Parameters of each stage. No stage changes them. A kit whose key is cut has some of its own, see
+/// `with_key`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Of the wall's stress.
+    /// Parameters of the wall's stress.
     pub strength: StrengthParams,
-    /// Of the division.
+    /// Parameters of the division.
     pub segmentation: SegmentationParams,
-    /// Of connector sizes.
+    /// Parameters of connector sizes.
     pub sizes: SizeParams,
-    /// Of the plan.
+    /// Parameters of the plan.
     pub plan: PlanParams,
-    /// Of the wall.
+    /// Parameters of the wall.
     pub body: BodyParams,
-    /// Of connectors.
+    /// Parameters of the connectors.
     pub connector: ConnectorParams,
-    /// Of the verdict.
+    /// Parameters of the verdict.
     pub verify: VerifyParams,
-    /// Of the play.
+    /// Parameters of the play.
     pub play: PlayParams,
 }
 
 impl Settings {
-    /// Those for `params`; a thickness that is still to be found counts as 2 mm.
+    /// Returns the settings for `params`. A thickness that is still to be found counts as 2 mm.
     pub fn resolve(params: &Params) -> Self {
         let thickness_mm = match params.thickness {
             Thickness::Mm(mm) => mm,
@@ -45,7 +45,7 @@ impl Settings {
         Self::with_thickness(params, thickness_mm)
     }
 
-    /// Those for a wall of this thickness, mm.
+    /// Returns the settings for a wall of this thickness, mm.
     pub fn with_thickness(params: &Params, thickness_mm: f64) -> Self {
         let Params {
             seed,
@@ -96,7 +96,7 @@ impl Settings {
         }
     }
 
-    /// The same for pieces of which `key` was cut to leave along `slide` alone.
+    /// Returns the settings for pieces of which `key` was cut to leave along `slide` alone.
     pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
         let key_gap_mm = self.body.seam_gap_mm.max(0.5 * self.connector.key_clearance_mm);
         Self {
@@ -113,8 +113,7 @@ impl Settings {
         }
     }
 
-    /// The least gaps that finished pieces keep: those of connectors and of walls, whichever
-    /// is narrower.
+    /// Returns the least gaps of finished pieces: those of connectors or of walls, whichever are narrower.
     pub(super) fn relief(&self) -> Relief {
         let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.seam_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
@@ -125,7 +124,7 @@ impl Settings {
     }
 }
 
-/// Every problem of every stage, in words. What follows from other values is not told twice.
+/// Lists the problems of all stages, in words. A value that follows from others is not reported twice.
 pub(super) fn problems(params: &Params) -> Vec<String> {
     let settings = Settings::resolve(params);
     let label = params.label.map_or_else(Vec::new, |l| l.problems());
@@ -141,7 +140,7 @@ pub(super) fn problems(params: &Params) -> Vec<String> {
     problems
 }
 
-/// What the user says of the division.
+/// Takes the user's parameters of the division.
 fn segmentation(params: &Params) -> SegmentationParams {
     SegmentationParams {
         method: params.method,
@@ -153,7 +152,7 @@ fn segmentation(params: &Params) -> SegmentationParams {
     }
 }
 
-/// What the user says of the plan.
+/// Takes the user's parameters of the plan.
 fn plan(params: &Params) -> PlanParams {
     let Params {
         seed,
@@ -169,8 +168,8 @@ fn plan(params: &Params) -> PlanParams {
     }
 }
 
-/// What the wall must bear. Two lines stand on either side of a seam's pin; three in all where the model is
-/// thin.
+/// Sets the limits of the wall. A seam's pin needs two printed lines on either side, or three in all if the
+/// model is thin.
 fn strength(params: &Params) -> StrengthParams {
     const LEAST_WALLS: f64 = 4.0;
     const THIN_WALLS: f64 = 3.0;

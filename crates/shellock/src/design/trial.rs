@@ -27,7 +27,7 @@ pub(super) enum Change {
     Enlarge(ChosenSizes),
     /// Other pieces, which one of the joining steps or [`Step::Divide`] made, and a warning of that.
     Divide(Step, SegmentedSurface, Option<Warning>),
-    /// A thicker wall.
+    /// A wall that is thicker.
     Thicken(Thicker),
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Divides the model.
+    /// Divides the model by the wall's settings.
     pub fn new(ctx: &Ctx, input: Input<'a>, wall: Arc<Wall>) -> Result<Self, DesignError> {
         let params = &wall.settings.segmentation;
         let surface = segmentation::segment(&ctx.fork(), params, input.model, input.labels)?;
