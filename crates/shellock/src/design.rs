@@ -102,25 +102,16 @@ fn explore<'a, T>(
     let mut best = Best::new();
     let mut change = None;
     loop {
-        let in_time = if best.has_end() {
+        let part = if best.has_end() {
             ctx.fork().ending_in_time()
         } else {
             ctx.fork()
         };
-        let ready = match change {
-            None => trial.begin(&in_time, agenda),
-            Some(change) => trial.apply(&in_time, agenda, change),
-        };
-        let site = trial.site(agenda);
-        let allowance = agenda.allowance(ctx);
-        let found = match ready {
-            Ok(None) => attempt(&in_time, trial.parts(agenda), &allowance),
-            Ok(Some(failure)) => Ok(Found::nothing(failure)),
-            Err(error) => Err(error),
-        };
-        for warning in in_time.into_warnings() {
+        let found = try_change(&part, agenda, trial, change, &attempt);
+        for warning in part.into_warnings() {
             ctx.warn(warning);
         }
+        let site = trial.site(agenda);
         let (mut changes, mut report) = (Vec::new(), Report::default());
         match found {
             Err(DesignError::Cancelled(_)) => {
@@ -156,6 +147,25 @@ fn explore<'a, T>(
         }
         let offered = changes.into_iter().find(|change| change.step() == step);
         change = Some(offered.unwrap_or(Change::Step(step)));
+    }
+}
+
+/// Makes a change, or begins the job if there is none, and attempts the trial that follows.
+fn try_change<'a, T>(
+    ctx: &Ctx,
+    agenda: &mut Agenda,
+    trial: &mut Trial<'a>,
+    change: Option<Change>,
+    attempt: impl Fn(&Ctx<'_>, Parts<'_, 'a>, &Allowance) -> Result<Found<T>, DesignError>,
+) -> Result<Found<T>, DesignError> {
+    let impossible = match change {
+        None => trial.begin(ctx, agenda),
+        Some(change) => trial.apply(ctx, agenda, change),
+    };
+    let allowance = agenda.allowance(ctx);
+    match impossible? {
+        None => attempt(ctx, trial.parts(agenda), &allowance),
+        Some(failure) => Ok(Found::nothing(failure)),
     }
 }
 

@@ -118,20 +118,9 @@ pub(super) fn make_kit(
         || next_plan(&kit_ctx, &planning, allowance),
     );
     let (grid, distances) = measured?;
-    let (chosen, late) = match next? {
-        Next::Plan(chosen, late) => (*chosen, late),
-        Next::Changes(changes, late) => {
-            return Ok(Found {
-                changes,
-                late,
-                ..Found::nothing(Failure::default())
-            });
-        }
-        Next::None(failure) => {
-            let failure = learned.failure.after(failure);
-            let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
-            return Ok(Found::nothing(failure).with(change));
-        }
+    let (chosen, late) = match plan_or_changes(ctx, division, learned, next?, allowance)? {
+        Ok(plan) => plan,
+        Err(found) => return Ok(found),
     };
     let recipe = Recipe {
         params: job.input.params,
@@ -149,7 +138,31 @@ pub(super) fn make_kit(
         }
         Err(lesson) => give_up(ctx, division, learned, &lesson, allowance)?,
     };
+    let late = late.or(found.late);
     Ok(Found { late, ..found })
+}
+
+/// Returns the plan to make, with the step that a lack of time rules out, or the changes to make instead.
+fn plan_or_changes<T>(
+    ctx: &Ctx,
+    division: &Division,
+    learned: &Learned,
+    next: Next,
+    allowance: &Allowance,
+) -> Result<Result<(Chosen, Option<Step>), Found<T>>, DesignError> {
+    Ok(Err(match next {
+        Next::Plan(chosen, late) => return Ok(Ok((*chosen, late))),
+        Next::Changes(changes, late) => Found {
+            changes,
+            late,
+            ..Found::nothing(Failure::default())
+        },
+        Next::None(failure) => {
+            let failure = learned.failure.after(failure);
+            let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
+            Found::nothing(failure).with(change)
+        }
+    }))
 }
 
 /// Returns the kit, or the lesson of a piece that something blocks.
@@ -341,30 +354,21 @@ pub(super) fn seek_plan(
         survey: setup.survey.as_ref().expect("plans were surveyed"),
         constraints: &setup.learned.constraints,
     };
-    Ok(match next_plan(&plan_ctx, &planning, allowance)? {
-        Next::Plan(chosen, late) => {
-            let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
-            Found {
-                end: Some(Planned::new(
-                    &setup.candidate.turn,
-                    &division.surface,
-                    *chosen,
-                    warnings,
-                )),
-                late,
-                ..Found::nothing(Failure::default())
+    let next = next_plan(&plan_ctx, &planning, allowance)?;
+    Ok(
+        match plan_or_changes(ctx, division, &setup.learned, next, allowance)? {
+            Ok((chosen, late)) => {
+                let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
+                let planned = Planned::new(&setup.candidate.turn, &division.surface, chosen, warnings);
+                Found {
+                    end: Some(planned),
+                    late,
+                    ..Found::nothing(Failure::default())
+                }
             }
-        }
-        Next::Changes(changes, late) => Found {
-            changes,
-            late,
-            ..Found::nothing(Failure::default())
+            Err(found) => found,
         },
-        Next::None(failure) => {
-            let change = divide(ctx, division, (&failure, 0), allowance)?;
-            Found::nothing(failure).with(change)
-        }
-    })
+    )
 }
 
 /// Seeks the next plan of a division to make.
