@@ -147,15 +147,15 @@ pub enum ReadError {
     /// An object out of which nothing can be cut.
     #[error("negative volumes cannot be cut out of \"{object}\": {reason}")]
     CutBody {
-        /// The object.
+        /// Name of the object.
         object: String,
-        /// Why.
+        /// Reason, as the end of the message.
         reason: String,
     },
     /// An object of which a cut leaves nothing.
     #[error("nothing is left of \"{object}\" after {cutters} is cut out; make what is cut out smaller")]
     NothingLeft {
-        /// The object.
+        /// Name of the object.
         object: String,
         /// Names of the parts that are cut out.
         cutters: String,
@@ -163,9 +163,9 @@ pub enum ReadError {
     /// No object, or no plate, of the name asked for.
     #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {
-        /// "the file" or "plate 1".
+        /// Place that was searched: "the file" or "plate 1".
         within: String,
-        /// "object" or "plate".
+        /// Kind of thing that is missing: "object" or "plate".
         what: &'static str,
         /// Name that was asked for.
         wanted: String,

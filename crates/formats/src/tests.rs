@@ -471,9 +471,10 @@ fn off_quirks() {
         })
     ));
     assert!(matches!(read("4OFF\n1 1 1"), Err(ReadError::Unsupported { .. })));
-    assert!(
-        matches!(read_mesh(b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2", Some("off")), Ok(loaded) if loaded.format == Format::Off)
-    );
+    assert!(matches!(
+        read_mesh(b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2", Some("off")),
+        Ok(loaded) if loaded.format == Format::Off
+    ));
     assert!(matches!(
         read("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1    \n"),
         Err(ReadError::TooFewCorners { n_corners: 2, .. })
@@ -597,7 +598,9 @@ fn read_all_ways(bytes: &[u8]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 2000, failure_persistence: None, ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_reader_panics_on_random_bytes(bytes in prop::collection::vec(any::<u8>(), 0..400)) {

@@ -97,8 +97,10 @@ fn package(model: &str) -> Vec<u8> {
 fn head(title: &str, namespace: &str, metadata: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"{namespace}>\n\
-         <metadata name=\"Title\">{title}</metadata>\n<metadata name=\"Application\">shellock</metadata>\n{metadata}<resources>\n"
+         <model unit=\"millimeter\" xml:lang=\"en-US\" \
+         xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"{namespace}>\n\
+         <metadata name=\"Title\">{title}</metadata>\n\
+         <metadata name=\"Application\">shellock</metadata>\n{metadata}<resources>\n"
     )
 }
 

@@ -90,7 +90,9 @@ fn a_sparse_accessor_reserves_only_what_triangles_use() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 2000, failure_persistence: None, ..ProptestConfig::default()
+    })]
 
     #[test]
     fn damaged_files_end_in_an_answer(
