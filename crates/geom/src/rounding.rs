@@ -21,7 +21,10 @@ pub enum NotPrintable {
     #[error("nothing is left of the body")]
     Empty,
     /// Distinct points still coincide after all rounds.
-    #[error("the surface still touches itself at {count} points after rounding, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
+    #[error(
+        "the surface still touches itself at {count} points after rounding, first at ({:.3}, {:.3}, {:.3})",
+        at.x, at.y, at.z
+    )]
     Touches {
         /// Number of such places.
         count: usize,

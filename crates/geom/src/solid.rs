@@ -44,7 +44,11 @@ pub enum NotSolid {
     },
     /// Some directed edges are used more than once: the mesh is not manifold there, or neighbouring faces
     /// disagree.
-    #[error("{count} edges are shared by more than two triangles or join triangles that face opposite ways, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
+    #[error(
+        "{count} edges are shared by more than two triangles or join triangles that face opposite ways, \
+         first at ({:.3}, {:.3}, {:.3})",
+        at.x, at.y, at.z
+    )]
     SharedEdge {
         /// Number of such edges.
         count: usize,

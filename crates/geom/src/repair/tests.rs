@@ -165,9 +165,10 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
 fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() {
     // Two cones that meet in their tips, joined by a belt: one body with one pinched point.
     let hourglass = both(cube(Vec3::ZERO, 1.0), cube(Vec3::ONE, 1.0));
-    assert!(
-        matches!(repair(&crate::weld::weld(&hourglass).mesh, RepairMode::Repair), Err(InputError::Bodies(b)) if b.len() == 2)
-    );
+    assert!(matches!(
+        repair(&crate::weld::weld(&hourglass).mesh, RepairMode::Repair),
+        Err(InputError::Bodies(b)) if b.len() == 2
+    ));
     let edge = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
     let refused = repair(&unwelded(&edge), RepairMode::Repair).unwrap_err();
     assert!(
