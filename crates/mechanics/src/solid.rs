@@ -112,7 +112,10 @@ pub enum SolidError {
         piece: usize,
     },
     /// A piece falls apart at voxel resolution.
-    #[error("piece {} is not one body at the size of voxels: {percent:.1} % of it hangs on nothing", .piece + 1)]
+    #[error(
+        "piece {} is not one body at the size of voxels: {percent:.1} % of it hangs on nothing",
+        .piece + 1
+    )]
     Apart {
         /// Index of the piece, from 0.
         piece: usize,
