@@ -8,7 +8,8 @@
 //! ```text
 //!  way ─► load asked ─► wall ─► key ─► division ─► plan ─► kit
 //!   ▲         ▲          ▲       ▲        ▲          ▲      │
-//!   └─────────┴──────────┴───────┴────────┴──────────┴──────┘  a step begins its level anew, and all levels within
+//!   └─────────┴──────────┴───────┴────────┴──────────┴──────┘
+//!      a step begins its level anew, and all levels within
 //! ```
 
 mod table;

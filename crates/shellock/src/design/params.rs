@@ -1,4 +1,4 @@
-//! What a user may set.
+//! Parameters that a user may set.
 
 use shellock_mechanics::Material;
 
@@ -6,8 +6,8 @@ use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
 use crate::segmentation::{KeepWhole, Method};
 
-/// Everything that a user may set, each once; what stages are given follows from it, see
-/// [`Settings`](super::Settings).
+/// Parameters that a user may set, each once. [`Settings`](super::Settings) derives the parameters of
+/// each stage from them.
 ///
 /// ```
 /// let mut params = shellock::Params::default();
@@ -19,43 +19,43 @@ use crate::segmentation::{KeepWhole, Method};
 pub struct Params {
     /// Seed of all random choices: the same seed gives the same kit. 0.
     pub seed: u64,
-    /// How pieces are found where there are no labels; where people would divide ([`Method::Auto`]).
+    /// Method that divides a model without labels; [`Method::Auto`], which cuts where people would.
     pub method: Method,
-    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in
-    /// creases from the area, 10 for a figure of 150 mm.
+    /// Number of pieces that automatic segmentation begins with. [2, 128]; `None`: as many as the method
+    /// finds. [`Method::Creases`] then takes the number from the area, 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
-    /// Regions that no seam is to divide; none.
+    /// Regions that no seam may divide; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry
-    /// alike; no.
+    /// True to divide both sides of a model's plane of symmetry alike; false. Only for [`Method::Auto`] and
+    /// [`Method::RandomCuts`].
     pub symmetric: bool,
-    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    /// Up direction of the standing model, of any length but 0; +z. A key underneath is preferred.
     pub up: [f64; 3],
-    /// Where the wall's thickness comes from; 2 mm.
+    /// Choice of the wall thickness; 2 mm.
     pub thickness: Thickness,
-    /// What pieces are printed of.
+    /// Material of the printed pieces.
     pub material: Material,
-    /// Height of the fall that the wall is to bear, m. [0.01, 20]; 1.275.
+    /// Height of the fall that the wall must withstand, m. [0.01, 20]; 1.275.
     pub drop_m: f64,
-    /// Where the key comes from.
+    /// Choice of the key; cut out of the surface.
     pub key: KeySource,
-    /// Whether a key that is cut gets a notch for a fingernail.
+    /// True to give a cut key a notch for a fingernail; false.
     pub has_grip: bool,
-    /// How the pieces' numbers are engraved; not at all where `None`.
+    /// Strokes of the engraved piece numbers; `None` engraves none.
     pub label: Option<LabelParams>,
-    /// How connectors are made.
+    /// Shape and fit of the connectors.
     pub connector: ConnectorParams,
-    /// How far each side of a seam stays back, mm. [0, 0.4]; 0.05.
+    /// Distance by which each side of a seam stays back from the cut, mm. [0, 0.4]; 0.05.
     pub seam_gap_mm: f64,
-    /// Spacing of the grid that fields live on, mm. (0, thickness / 2]; `None` takes the thickness over 2.5.
+    /// Spacing of the grid on which fields are sampled, mm. (0, thickness / 2]; `None`: thickness / 2.5.
     pub cell_mm: Option<f64>,
-    /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
+    /// Budget of the exact search for a plan, in pieces revised. [0, 10⁹]; 100 000.
     pub proof_budget: usize,
-    /// Whether pieces are made though hardly anything of the model can be hollow.
+    /// True to make pieces even if the model is too thin to be hollow; false.
     pub allows_thin: bool,
-    /// Whether the play of all pieces together is looked for, too.
+    /// True to measure the play of all pieces together, too; false.
     pub is_play_together: bool,
-    /// How often a kit that failed its verification is planned and made again.
+    /// Limits on planning and making another kit after one failed its verification.
     pub rounds: Rounds,
 }
 
@@ -86,18 +86,18 @@ impl Default for Params {
 }
 
 impl Params {
-    /// Every problem of every stage, in words; empty where there is none.
+    /// Lists every problem of every stage, in words. Empty if the parameters are valid.
     pub fn problems(&self) -> Vec<String> {
         super::settings::problems(self)
     }
 }
 
-/// Where the wall's thickness comes from.
+/// Choice of the wall thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
-    /// It is so much, mm, in [0.8, 10]; the stress in it is reported.
+    /// Thickness that the user gives, mm, in [0.8, 10]. The stress in the wall is reported.
     Mm(f64),
-    /// The least that bears a fall.
+    /// Thinnest wall that withstands the fall.
     Auto,
 }
 
@@ -107,42 +107,42 @@ impl Default for Thickness {
     }
 }
 
-/// Where the key comes from.
+/// Choice of the key, the piece installed last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
-    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as
-    /// with `Flattest`.
+    /// Cut out of the surface where it slides best, see [`crate::key`]. If no such kit passes, the key is
+    /// chosen as with `Flattest`.
     #[default]
     Cut,
-    /// The same as near as can be to a place in the model's space, mm.
+    /// Cut out of the surface as near as possible to this point of the model, mm.
     CutNear([f64; 3]),
-    /// The flattest piece that works.
+    /// Flattest piece that works as a key.
     Flattest,
-    /// The piece with this label, where labels are given; else the one that has this number, from 1, once the
-    /// model is divided (as `shellock segment` numbers them).
+    /// Piece with this label, if labels are given. Otherwise the piece with this number, from 1, in the
+    /// divided model (as `shellock segment` numbers them).
     Piece(i64),
 }
 
 impl KeySource {
-    /// Whether the key is cut out of the surface.
+    /// Returns true if the key is cut out of the surface.
     pub fn is_cut(self) -> bool {
         matches!(self, Self::Cut | Self::CutNear(_))
     }
 }
 
-/// Bounds of the feedback loop.
+/// Limits of the feedback loop: kits made, and segmentations revised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
-    /// Kits made for one segmentation, at most. ≥ 1; 3.
+    /// Most kits made for one segmentation. ≥ 1; 3.
     pub kits: usize,
-    /// Segmentations revised after the first, at most; 4.
+    /// Most segmentations revised after the first; 4.
     pub refinements: usize,
-    /// Kits made of all segmentations, at most. ≥ 1; 8.
+    /// Most kits made of all segmentations. ≥ 1; 8.
     pub kits_in_all: usize,
 }
 
 impl Rounds {
-    /// No more of anything than `other` allows.
+    /// Returns the smaller of each pair of limits.
     pub fn least(&self, other: &Self) -> Self {
         Self {
             kits: self.kits.min(other.kits),
