@@ -279,7 +279,8 @@ fn predicted_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
 
 /// Next thing to do with a division.
 pub(super) enum Next {
-    /// Make the kit of this plan, the strongest of those with about the least cost. A lack of time may have ruled out a step that would make it stronger.
+    /// Make the kit of this plan, the strongest of those with about the least cost. A lack of time may have
+    /// ruled out a step that would make it stronger.
     Plan(Box<Chosen>, Option<Step>),
     /// Make nothing yet: change the trial first.
     Changes(Vec<Change>, Option<Step>),
