@@ -133,8 +133,8 @@ impl Rating<'_> {
     }
 
     /// Enlarges, to the largest that fits, the connectors of every pair that opens under a load which the kit
-    /// does not withstand. Repeats, since another pair may then open first. Returns the best round's sizes and
-    /// its least load factor.
+    /// does not withstand. Repeats, since another pair may then open first. Returns the best round's sizes
+    /// and its least load factor.
     fn enlarge(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), DesignError> {
         let aim = self.asked + AIM;
         let mut best = (self.division.chosen.clone(), least(bears));
