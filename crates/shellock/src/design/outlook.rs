@@ -38,7 +38,7 @@ pub enum Verdict {
         /// Site of the key; `None` if it is one of the pieces.
         key: Option<KeySite>,
     },
-    /// No plan was found for any key.
+    /// No plan was found with the keys that were tried.
     Blocked {
         /// Reason why there is no plan, for people.
         reason: String,

@@ -51,7 +51,7 @@ pub struct Params {
     pub cell_mm: Option<f64>,
     /// Budget of the exact search for a plan, in pieces revised. [0, 10⁹]; 100 000.
     pub proof_budget: usize,
-    /// True to make pieces even if the model is too thin to be hollow; false.
+    /// True to make pieces even if the model is too thin for a cavity or for connectors; false.
     pub allows_thin: bool,
     /// True to measure the play of all pieces together, too; false.
     pub is_play_together: bool,
