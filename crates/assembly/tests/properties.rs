@@ -173,8 +173,7 @@ proptest! {
 
     #[test]
     fn no_direction_is_nearer_than_the_nearest_and_it_turns_with_the_vector(
-        turn in turns(),
-        v in vectors(1.0),
+        turn in turns(), v in vectors(1.0)
     ) {
         let nearest = LatticeDirection::nearest(v);
         let mut dots: Vec<f64> = LatticeDirection::all().map(|d| d.unit().dot(v)).collect();

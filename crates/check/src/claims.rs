@@ -245,8 +245,8 @@ mod tests {
             ));
         }
         let quantity = |at: Value, most: f64| {
-            let most = vec![[most; 2]; 3];
-            json!({ "plus": 2, "minus": null, "at": at, "axes": axes, "most": most })
+            json!({ "plus": 2, "minus": null, "at": at,
+            "axes": axes, "most": vec![[most; 2]; 3] })
         };
         let bounded = json!({ "claim": "bounded", "free": [2], "of_piece": [[0, 1]],
             "quantities": [quantity(Value::Null, 0.024), quantity(json!([0.0, 0.0, 0.0]), 0.12)],
@@ -309,9 +309,8 @@ mod tests {
     #[test]
     fn one_lock_that_the_key_leaves_is_needed() {
         let least = json!({ "overall": null, "beneath_rim": null });
-        let lock = json!({
-            "claim": "locked", "held": [1], "leaves": 2, "multipliers": [], "residual": 0.0, "hold": 0.1
-        });
+        let lock = json!({ "claim": "locked", "held": [1], "leaves": 2, "multipliers": [],
+            "residual": 0.0, "hold": 0.1 });
         let up = [0.0, 0.0, 1.0];
         let others = [
             json!({ "claim": "key-leaves", "piece": 2, "direction": up, "least": least }),

@@ -435,9 +435,9 @@ fn test_completeness(c: &Certificate) -> Tested {
     }
     let first = c.installation_order.first().copied().unwrap_or_default();
     let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { .. });
-    let is_needed_lock = |claim: &Claim| match claim {
-        Claim::Locked { held, leaves, .. } => *held == [first] && *leaves == c.key,
-        _ => false,
+    let is_needed_lock = |claim: &Claim| {
+        matches!(claim, Claim::Locked { held, leaves, .. }
+            if *held == [first] && *leaves == c.key)
     };
     if first == c.key || count(&is_lock) != 1 || count(&is_needed_lock) != 1 {
         return Err(format!(

@@ -118,8 +118,8 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     };
     let certificate = certify(named, &pieces, &plan, &evidence, CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
-        let along = (-s.separation.unit() + 0.0).to_array();
-        json!({ "file": format!("{}.stl", usize::from(s.piece)), "installation_direction": along })
+        json!({ "file": format!("{}.stl", usize::from(s.piece)),
+            "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });
     let plan = json!({ "version": 2, "key_piece": 3, "installation_order": [1, 2, 3],
                        "clearance": CLEARANCE_MM, "pieces": pieces.collect::<Vec<_>>() });

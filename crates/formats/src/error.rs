@@ -149,7 +149,7 @@ pub enum ReadError {
     CutBody {
         /// Name of the object.
         object: String,
-        /// Reason in words for people.
+        /// Reason, as the end of the message.
         reason: String,
     },
     /// An object of which a cut leaves nothing.
@@ -163,9 +163,9 @@ pub enum ReadError {
     /// No object, or no plate, of the name asked for.
     #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {
-        /// "the file" or "plate 1".
+        /// Place that was searched: "the file" or "plate 1".
         within: String,
-        /// Kind of thing: "object" or "plate".
+        /// Kind of thing that is missing: "object" or "plate".
         what: &'static str,
         /// Name that was asked for.
         wanted: String,

@@ -599,9 +599,7 @@ fn read_all_ways(bytes: &[u8]) {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 2000,
-        failure_persistence: None,
-        ..ProptestConfig::default()
+        cases: 2000, failure_persistence: None, ..ProptestConfig::default()
     })]
 
     #[test]

@@ -23,9 +23,7 @@ pub enum NotPrintable {
     /// Distinct points still coincide after all rounds.
     #[error(
         "the surface still touches itself at {count} points after rounding, first at ({:.3}, {:.3}, {:.3})",
-        at.x,
-        at.y,
-        at.z
+        at.x, at.y, at.z
     )]
     Touches {
         /// Number of such places.

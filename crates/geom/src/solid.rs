@@ -47,9 +47,7 @@ pub enum NotSolid {
     #[error(
         "{count} edges are shared by more than two triangles or join triangles that face opposite ways, \
          first at ({:.3}, {:.3}, {:.3})",
-        at.x,
-        at.y,
-        at.z
+        at.x, at.y, at.z
     )]
     SharedEdge {
         /// Number of such edges.

@@ -173,15 +173,15 @@ fn try_change<'a, T>(
 /// as they are installed.
 #[non_exhaustive]
 pub struct Planned {
-    /// Surface divided into pieces.
+    /// Surface divided into the pieces.
     pub surface: SegmentedSurface,
     /// Order and directions of installation.
     pub plan: InstallationPlan,
-    /// Bound of its cost.
+    /// Proven bound of the plan's cost.
     pub proof: PlanProof,
-    /// Mean cost of its pieces.
+    /// Mean cost of the plan's pieces.
     pub mean_cost: f64,
-    /// Number of plans it was chosen from.
+    /// Number of plans that this one was chosen from.
     pub n_plans: usize,
     /// Load factors and weak places, by simulation.
     pub holding: Holding,

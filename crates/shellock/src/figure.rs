@@ -103,7 +103,7 @@ pub fn make(figure: Figure, size_mm: f64, cell_mm: f64) -> Solid {
 ///
 /// # Panics
 ///
-/// As [`make`].
+/// Panics under the same conditions as [`make`].
 pub fn make_with_limbs(figure: Figure, size_mm: f64, cell_mm: f64) -> (Solid, Vec<u32>) {
     let sculpture = figure.sculpture();
     let bounds = sculpture.bounds();

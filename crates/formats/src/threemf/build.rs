@@ -43,7 +43,7 @@ struct Build<'a> {
     /// Index of an object in the model, by its model part and id.
     place_of: BTreeMap<(&'a str, u32), usize>,
     settings: &'a Settings,
-    /// Place of each item of the build.
+    /// Plate of each item of the build; `None` if there is none.
     plates: Vec<Option<FilePlate>>,
     /// True for each item that is read.
     is_made: Vec<bool>,

@@ -36,8 +36,8 @@ pub enum InputError {
     /// Edges with more than two triangles.
     #[error(
         "{} more than two triangles, first near {}{}; \
-         the surface touches or doubles itself there: remove doubled faces and merge the parts in a \
-         modelling program",
+         the surface touches or doubles itself there: remove doubled faces and merge the parts \
+         in a modelling program",
         plural(*count, "edge has", "edges have"), Coordinates(*at), copies(*n_copies)
     )]
     Shared {
@@ -129,9 +129,9 @@ pub enum InputError {
     /// Bodies that are inside out and overlap another.
     #[error(
         "{} inside out and {} another, first near {}: \
-         it is a hole or a part; export the model without it, cut it out or unite it in a modelling program",
-        plural(*count, "body is", "bodies are"),
-        if *count == 1 { "overlaps" } else { "overlap" },
+         it is a hole or a part; export the model without it, cut it out \
+         or unite it in a modelling program",
+        plural(*count, "body is", "bodies are"), if *count == 1 { "overlaps" } else { "overlap" },
         Coordinates(*at)
     )]
     Cutter {
@@ -142,8 +142,8 @@ pub enum InputError {
     },
     /// One-sided surface: no orientation of its triangles makes all neighbours agree.
     #[error(
-        "the surface has one side only, like a Möbius band: {} triangles that face opposite ways however \
-         they are turned, first near {}; it bounds no body: model it with a thickness",
+        "the surface has one side only, like a Möbius band: {} triangles that face opposite ways \
+         however they are turned, first near {}; it bounds no body: model it with a thickness",
         plural(*count, "edge joins", "edges join"), Coordinates(*at)
     )]
     OneSided {

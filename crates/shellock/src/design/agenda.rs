@@ -9,7 +9,7 @@
 //!  way ─► load asked ─► wall ─► key ─► division ─► plan ─► kit
 //!   ▲         ▲          ▲       ▲        ▲          ▲      │
 //!   └─────────┴──────────┴───────┴────────┴──────────┴──────┘
-//!              a step begins its level anew, and all levels within
+//!      a step begins its level anew, and all levels within
 //! ```
 
 mod table;

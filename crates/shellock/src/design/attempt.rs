@@ -92,7 +92,7 @@ pub(super) fn make_kit(
     }: Parts<'_, '_>,
     allowance: &Allowance,
 ) -> Result<Found<Kit>, DesignError> {
-    // A kit that is given up takes its warnings with it.
+    // Warnings of a kit that is given up are dropped with it, so they get a context of their own.
     let kit_ctx = ctx.fork();
     setup.division.warn(&kit_ctx);
     setup.survey_plans(ctx)?;
@@ -181,7 +181,7 @@ fn unless_blocked(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>,
     }
 }
 
-/// Gives a plan up, since a piece could not take its wall along.
+/// Gives a plan up, since a piece cannot move out with enough of its wall.
 fn give_up(
     ctx: &Ctx,
     division: &Division,
@@ -211,7 +211,7 @@ fn learn(
     let found = if kit.is_firm() {
         Found::nothing(Failure::default())
     } else if kit.only_rattles() {
-        // The plan was chosen to rattle least, so only other pieces help.
+        // The search already chose the plan with the least rattling, so only other pieces help.
         let rattling: Vec<PatchId> = kit
             .rattling()
             .into_iter()
@@ -292,8 +292,8 @@ fn predicted_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
 
 /// Next thing to do with a division.
 pub(super) enum Next {
-    /// Make the kit of this plan, which holds best of those that cost about the least. A lack of time may
-    /// have ruled out a step that would make it stronger.
+    /// Make the kit of this plan, the strongest of those with about the least cost. A lack of time may have
+    /// ruled out a step that would make it stronger.
     Plan(Box<Chosen>, Option<Step>),
     /// Make nothing yet: change the trial first.
     Changes(Vec<Change>, Option<Step>),
@@ -425,7 +425,7 @@ pub(super) fn next_plan(
     })
 }
 
-/// Warns of conditions that a key breaks which was not cut to meet them.
+/// Warns of conditions for keys that an uncut key does not meet.
 fn warn_of_key(ctx: &Ctx, planning: &Planning<'_>, plan: &LatticePlan) {
     let division = planning.division;
     let may_be_cut = !planning.input.params.key.is_cut();

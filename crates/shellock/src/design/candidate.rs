@@ -64,8 +64,8 @@ impl<'a> Candidate<'a> {
         Some(turned)
     }
 
-    /// Cuts the key out of these pieces and settles what the stages are given; `None` if the key does not
-    /// come out as one piece.
+    /// Cuts the key out of these pieces and resolves the stages' settings. `None` if the key does not come
+    /// out as one piece.
     pub fn divide(
         &self,
         ctx: &Ctx,
@@ -90,7 +90,7 @@ impl<'a> Candidate<'a> {
         };
         let settings = given.with_key(patch, key.along);
         let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
-        // Its rails have as much room as it was cut for.
+        // The key was cut with room for rails of the usual size.
         chosen.cap(patch, settings.connector.size.usual_mm());
         let grip = job.input.params.has_grip.then(|| key.grip(patch));
         Ok(Some(Division {
@@ -155,7 +155,7 @@ impl CutKey {
 
     /// Returns a notch across the key, nearer to its front.
     fn grip(&self, key: PatchId) -> Grip {
-        /// Share of the key's length.
+        /// Position of the notch from the key's back, as a share of the key's length.
         const FROM_BACK: f64 = 0.65;
         let prism = self.site.prism;
         let KeyPrism {

@@ -1,9 +1,8 @@
-//! From where pieces are made to what people hold: the model as they gave it, and pieces numbered in the
-//! order in which they go in.
+//! Conversion of a kit from the space in which it is made to the user's: the model as given, with pieces
+//! numbered in the order of installation.
 //!
-//! Pieces are made of the model turned for its key, by the patches of a division. Nobody outside needs to
-//! know of either: what a kit says is in the space of the model as it was given, and its first piece is
-//! number 1.
+//! Pieces are made in the model turned for its key, and identified by the patches of a division. Neither is
+//! visible outside: places in a kit are in the space of the model as given, and the first piece is number 1.
 
 use shellock_geom::{TriMesh, Vec3};
 
@@ -17,7 +16,7 @@ use crate::{
     Cause, ConnectorSizes, Direction, IdVec, InstallationPlan, PatchId, PressFit, SegmentedSurface, Warning,
 };
 
-/// How one is told by the other.
+/// Map from the turned model and its patches to the model as given and the pieces of the kit.
 #[derive(Clone, Debug)]
 pub(super) struct Handover {
     back: Turn,
@@ -28,7 +27,7 @@ pub(super) struct Handover {
 }
 
 impl Handover {
-    /// For pieces made by `plan` of a model that was turned by `turn`.
+    /// Creates the map for pieces made by `plan` of a model that was turned by `turn`.
     pub fn new(turn: &Turn, plan: LatticePlan) -> Self {
         Self {
             back: turn.inverse(),
@@ -47,7 +46,7 @@ impl Handover {
         self.plan.steps[usize::from(piece)].piece
     }
 
-    /// The turn that pieces get at last.
+    /// Rotation back to the model as given, which finished pieces get.
     pub fn turn(&self) -> &Turn {
         &self.back
     }
@@ -64,7 +63,7 @@ impl Handover {
         self.back.apply(Vec3::from(place)).to_array()
     }
 
-    /// One element a piece, in their order; none where there are none.
+    /// Sorts one element per patch into the order of the pieces. An empty slice stays empty.
     fn in_order<T: Clone>(&self, of_patches: &[T]) -> Vec<T> {
         if of_patches.is_empty() {
             return Vec::new();
@@ -73,7 +72,7 @@ impl Handover {
         patches.map(|patch| of_patches[patch].clone()).collect()
     }
 
-    /// The order and the directions.
+    /// Order and directions of installation, in the user's space.
     pub fn plan(&self) -> InstallationPlan {
         let way = |v: Vec3| Direction::of(self.back.apply(v)).expect("a turned direction has one");
         let steps = self.plan.steps.iter().enumerate();
@@ -128,7 +127,7 @@ impl Handover {
     }
 
     fn borne(&self, borne: LoadBorne) -> LoadBorne {
-        // Of a direction as of a place: turns keep the origin.
+        // `at` also turns directions, since turns keep the origin.
         let deed = match borne.deed {
             Deed::PressSide { toward } => Deed::PressSide {
                 toward: self.at(toward),
@@ -170,7 +169,7 @@ impl Handover {
         }
     }
 
-    /// Pieces whose meshes were turned already, before they were rounded.
+    /// Converts finished pieces. Their meshes were already turned, before rounding.
     pub fn finished(&self, finished: Finished) -> Finished {
         let joint = |j: FinishedJoint| FinishedJoint {
             male: self.piece(j.male),
@@ -211,7 +210,7 @@ impl Handover {
                     | Cause::ComesApart
                     | Cause::PieceWithoutNumber
             ) {
-                // A plain list.
+                // The order of the pieces means nothing here, so list them by number.
                 pieces.sort_unstable();
             }
             Warning {
@@ -223,7 +222,7 @@ impl Handover {
         warnings.into_iter().map(told).collect()
     }
 
-    /// Causes that name pieces beside the warning's own.
+    /// Converts causes that name pieces of their own.
     fn cause(&self, cause: Cause) -> Cause {
         match cause {
             Cause::LabelsDivided { into } => Cause::LabelsDivided {

@@ -1,4 +1,4 @@
-//! One kit: a plan made into pieces, and the verdict on them.
+//! One kit: the finished pieces of a plan, and their verification.
 
 use shellock_geom::{Aabb, Solid, TriMesh};
 
@@ -20,49 +20,49 @@ use crate::{
     piece,
 };
 
-/// Pieces that were made as planned, and what is known of them. All places and directions are those of the
-/// model as it was given; pieces are numbered as they go in.
+/// Finished pieces of a plan, with their verification and measurements. Places and directions are in the
+/// space of the model as given. Pieces are numbered in the order of installation.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Kit {
-    /// The segmented surface it was made from.
+    /// Segmented surface that the pieces were made from.
     pub surface: SegmentedSurface,
-    /// Connector sizes of its pairs of pieces.
+    /// Connector size of each pair of pieces.
     pub sizes: ConnectorSizes,
     /// Order and directions of installation.
     pub plan: InstallationPlan,
-    /// How good the plan is.
+    /// Proven bound of the plan's cost.
     pub proof: PlanProof,
-    /// Simulated resistance to separation, and the weak places.
+    /// Load factors and weak places, by simulation.
     pub holding: Holding,
-    /// Motion of the pieces under the loads that are reported.
+    /// Motion of the pieces under each reported load, by simulation.
     pub deformed: Deformed,
-    /// Thickness of its walls, mm.
+    /// Thickness of the walls, mm.
     pub thickness_mm: f64,
-    /// One printable mesh a piece, in assembled position, mm.
+    /// One printable mesh per piece, in assembled position, mm.
     pub pieces: IdVec<PatchId, TriMesh>,
-    /// Connector runs and how they came out.
+    /// Connector runs after carving, with the lengths that are left.
     pub joints: Vec<FinishedJoint>,
-    /// Press fits that the key passes on its way in.
+    /// Features that press on purpose on the key's way in.
     pub press_fits: Vec<PressFit>,
-    /// Room for connectors along the seams.
+    /// Room for connectors on each seam.
     pub contacts: Vec<SeamRoom>,
-    /// The verdict on the finished meshes.
+    /// Checks of the finished meshes, with their findings.
     pub verification: Verification,
-    /// Contacts of the finished pieces.
+    /// Contacts between the finished pieces.
     pub touching: Vec<verify::contact::Contact>,
-    /// Play of the finished pieces within their gaps.
+    /// Play of the finished pieces: motion within their gaps.
     pub play: KitPlay,
-    /// The pieces that rattle, the loosest first.
+    /// Pieces that rattle, the loosest first.
     pub rattles: Vec<Rattle>,
-    /// Warnings of the stages.
+    /// Warnings of the stages that made the kit.
     pub warnings: Vec<Warning>,
-    /// Patches that the pieces were made of.
+    /// Map from the kit's pieces to the patches that they were made of.
     pub(super) handover: Handover,
 }
 
 impl Kit {
-    /// Length of the rails that the key slides on, mm; 0 where it has none.
+    /// Length of the rails that the key slides on, mm; 0 if it has none.
     pub fn rails_mm(&self) -> f64 {
         self.joints
             .iter()
@@ -71,7 +71,7 @@ impl Kit {
             .fold(0.0, |sum, mm| sum + mm)
     }
 
-    /// Returns the names of the checks that fail.
+    /// Names of the checks that the kit fails.
     pub fn failures(&self) -> Vec<String> {
         self.verification
             .checks
@@ -81,12 +81,13 @@ impl Kit {
             .collect()
     }
 
-    /// Returns true if the kit passed and no piece rattles.
+    /// Returns true if the kit passed its verification and no piece rattles.
     pub fn is_firm(&self) -> bool {
         self.verification.passed() && self.rattles.is_empty()
     }
 
-    /// Returns true if rattling is the only fault, loose or not.
+    /// Returns true if rattling is the only fault: a piece rattles, and either no check fails, or one fails
+    /// and all findings are of play that is too wide.
     pub fn only_rattles(&self) -> bool {
         let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
         let n_failures = self.failures().len();
@@ -95,14 +96,14 @@ impl Kit {
         is_all && !self.rattles.is_empty()
     }
 
-    /// Returns the pieces that rattle, the loosest first. The key is left out, since it is cut where there is
-    /// room for it.
+    /// Pieces other than the key that rattle, the loosest first. The key is left out because it is cut
+    /// where there is room for it.
     pub fn rattling(&self) -> Vec<PatchId> {
         let pieces = self.rattles.iter().map(|r| r.piece);
         pieces.filter(|piece| *piece != self.plan.key()).collect()
     }
 
-    /// Grade by which kits are compared.
+    /// Returns the grade by which kits are compared.
     pub(super) fn grade(&self) -> Grade {
         Grade {
             n_pieces: self.pieces.len(),
@@ -114,20 +115,20 @@ impl Kit {
     }
 }
 
-/// Input of a kit, each part from an earlier stage.
+/// Inputs of a kit, each from an earlier stage.
 pub(super) struct Recipe<'a> {
     pub params: &'a Params,
     pub division: &'a Division,
-    /// The model as it was given, and how it was turned for the division.
+    /// Model as given, before `turn` turns it for the division.
     pub model: &'a Solid,
     pub turn: &'a Turn,
-    /// It must have room for the division's largest connectors.
+    /// Grid of the wall, with room for the division's largest connectors.
     pub grid: &'a ShellGrid,
     pub distances: &'a PatchDistances,
     pub chosen: Chosen,
 }
 
-/// Makes and verifies the kit of one plan; `ctx` has what was warned of on the way to the plan.
+/// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning.
 pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError> {
     let Recipe {
         params,
@@ -199,7 +200,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     })
 }
 
-/// Lays out the runs of connectors, and measures the room along the seams.
+/// Places connectors along the seams. Returns their runs, and the room that each seam has for them.
 fn connectors(
     settings: &Settings,
     sizes: &ConnectorSizes,
@@ -215,7 +216,7 @@ fn connectors(
     let runs_for = |slide| connector::runs(&settings.connector, sizes, plan, &curves, slide, &is_free);
     match settings.plan.key.and(settings.plan.key_slide) {
         Some(cut) => runs_for(Some(cut.unit())),
-        // A piece that is the key has rails where its seams happen to allow them.
+        // If one of the pieces is the key, it gets rails only if its seams happen to allow them.
         None => {
             let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
             if own.0.iter().any(Run::is_rail) {
@@ -227,7 +228,7 @@ fn connectors(
     }
 }
 
-/// Judgement on the finished meshes.
+/// Verification and play of the finished meshes.
 struct Judged {
     verification: Verification,
     touching: Vec<verify::contact::Contact>,
@@ -235,7 +236,7 @@ struct Judged {
     rattles: Vec<Rattle>,
 }
 
-/// Judges the meshes: verdict, contacts, play, and ways out.
+/// Verifies the finished meshes, and measures their contacts and play. The checks include those on play.
 fn judged(
     ctx: &Ctx,
     settings: &Settings,
@@ -255,7 +256,7 @@ fn judged(
     let rattles = play::rattles(&measured, &finished.meshes, size_mm, settings.verify.clearance_mm);
     verification.add(play::check(&measured, &rattles));
     if verification.passed() {
-        // It is slow; what fails already is not given out.
+        // The search for ways out is slow, so kits that already fail are not searched.
         play::look_for_ways_out(ctx, settings.verify.clearance_mm, &finished.meshes, &mut measured)?;
         play::check_ways_out(&measured, &finished.meshes)
             .into_iter()
@@ -269,7 +270,7 @@ fn judged(
     })
 }
 
-/// Says what the key must be pressed past, and what holds a key without rails.
+/// Warns of detents that the key must be pressed past, and of ribs that hold a key without rails.
 fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
     let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
     for d in of(PressFitKind::Detent) {
@@ -295,7 +296,7 @@ fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
     }
 }
 
-/// Says which long seams came out without any connector.
+/// Warns of seams that have the length for a connector, but came out without one.
 fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], joints: &[FinishedJoint]) {
     let has_room = |c: &&SeamRoom| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
     for contact in contacts.iter().filter(has_room) {
@@ -313,9 +314,9 @@ fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], 
     }
 }
 
-/// The box around each patch and all connectors its piece can have.
+/// Returns a box around each patch and all connectors that its piece can have.
 fn rooms(settings: &Settings, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> IdVec<PatchId, Aabb> {
-    /// Carving shifts seams by less than this, mm.
+    /// Upper bound of the shift of seams by carving, mm.
     const SHIFT_MM: f64 = 2.0;
     let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
     for (face, &p) in surface.patch_of_face.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Lessons of a kit that failed its verification, for the next plan.
+//! Lessons for the next round from a finished kit that failed its verification.
 
 use std::collections::BTreeMap;
 
@@ -11,70 +11,70 @@ use crate::seam::rules::SHORTEST_RUN_SIZES;
 use crate::verify::Finding;
 use crate::{LatticeDirection, PatchId};
 
-/// Lesson of a kit or plan that failed.
+/// One lesson from a plan or kit that failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lesson {
-    /// Connectors came out too short to hold.
+    /// Connectors came out too short to hold their pieces together.
     WeakJoints(Vec<WeakJoint>),
-    /// A piece rubs on its way along a direction.
+    /// A piece rubs on another along its direction.
     RubbingPath {
-        /// Piece that the lesson is about.
+        /// Id of the piece's patch.
         piece: PatchId,
-        /// Direction in which it leaves.
+        /// Direction in which the piece leaves.
         separation: LatticeDirection,
-        /// Earlier piece that blocks it most.
+        /// Earlier piece with the worst overlap.
         against: PatchId,
-        /// Distance from its place, mm.
+        /// Distance of the overlap from the assembled position, mm.
         travel_mm: f64,
         /// Mean thickness of the overlap, mm.
         thickness_mm: f64,
         /// Volume of the overlap, mm³.
         volume_mm3: f64,
     },
-    /// A piece would have to leave most of its wall behind.
+    /// A piece that moves out would leave most of its wall behind.
     Blocked {
-        /// Piece that the lesson is about.
+        /// Id of the piece's patch.
         piece: PatchId,
-        /// Direction in which it leaves.
+        /// Direction in which the piece leaves.
         separation: LatticeDirection,
-        /// Share of its wall that it could take along, in [0, 1].
+        /// Share of the wall that could move out with the piece, in [0, 1].
         kept: f64,
     },
-    /// A piece lost outer surface to what it passes on its way along a direction.
+    /// A piece lost outer surface because it was cut to pass others along its direction.
     SkinLost {
-        /// Piece that the lesson is about.
+        /// Id of the piece's patch.
         piece: PatchId,
-        /// Direction in which it leaves.
+        /// Direction in which the piece leaves.
         separation: LatticeDirection,
-        /// Place where the hole is deepest.
+        /// Deepest point of the hole, mm.
         at: Vec3,
     },
-    /// The plan as a whole failed.
+    /// The plan as a whole failed, whatever the reason.
     FailedPlan {
-        /// Plan that must not be made again.
+        /// Plan to reject, in patches of the division.
         plan: LatticePlan,
-        /// Pieces that were loose or moved.
+        /// Pieces that were loose, or moved in a cluster.
         loose: Vec<PatchId>,
     },
 }
 
-/// Pair of pieces whose connectors are too short if the later one leaves in this direction.
+/// Pair of pieces whose connectors are too short when the later piece leaves along `separation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeakJoint {
-    /// Piece that is installed later.
+    /// Piece of the pair installed later.
     pub later: PatchId,
-    /// Piece that is installed earlier.
+    /// Piece of the pair installed earlier.
     pub earlier: PatchId,
     /// Direction in which the later piece leaves.
     pub separation: LatticeDirection,
-    /// Length of their connectors, mm.
+    /// Length of the pair's connectors, mm.
     pub length_mm: f64,
-    /// Length of their seams on the inner side of the wall, mm.
+    /// Length of the pair's seams on the inner side of the wall, mm.
     pub seam_mm: f64,
 }
 
 impl Lesson {
-    /// Adds the lesson to the constraints that plans must respect.
+    /// Adds the lesson to the constraints on later plans.
     pub fn teach(&self, constraints: &mut PlanConstraints) {
         match self {
             Self::WeakJoints(joints) => {
@@ -103,7 +103,7 @@ impl Lesson {
         }
     }
 
-    /// Returns the pieces whose division may help.
+    /// Pieces whose division into smaller ones may help.
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
             Self::WeakJoints(_) => Vec::new(),
@@ -187,8 +187,8 @@ impl std::fmt::Display for Lesson {
     }
 }
 
-/// Derives the lessons of a kit for the patches of the division that it was made of; none if it passed. The
-/// last lesson always rules out the kit's plan.
+/// Returns the lessons of a kit, in patches of its division. The last one always rejects the kit's plan.
+/// Empty if the kit passed.
 pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     if kit.verification.passed() {
         return Vec::new();
@@ -224,7 +224,7 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
             &Finding::SurfaceLost { at, .. } => {
                 let (at, stays) = (at.into(), kit.plan.steps[0].piece);
                 let piece = patch_at(kit, at);
-                // What stays to the last gives way to nothing.
+                // The piece installed first never moves out, so it has no direction to forbid.
                 if piece != stays {
                     let piece = patch(piece);
                     let separation = found.separation(piece);
@@ -249,13 +249,13 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     learned
 }
 
-/// Returns the piece with the outer surface at a place.
+/// Returns the piece whose outer surface is nearest to a point.
 fn patch_at(kit: &Kit, at: Vec3) -> PatchId {
     let nearest = TriangleBvh::new(&kit.surface.mesh).nearest(at, f64::INFINITY);
     kit.surface.patch_of_face[nearest.expect("a surface has triangles").face as usize]
 }
 
-/// Returns the pairs whose connectors are too short, so that no plan counts on them again in this way.
+/// Finds pairs whose connectors are too short. Later plans must not rely on them along the same direction.
 fn weak_joints(kit: &Kit) -> Option<Lesson> {
     let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
     let by_order = |a: PatchId, b: PatchId| {

@@ -1,4 +1,4 @@
-//! End of a job: the best kit with all that is known of it, or the reason why there is none.
+//! End of a job: the best kit with its measurements, or the reason why there is none.
 
 use std::sync::Arc;
 
@@ -23,51 +23,51 @@ use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
-/// A finished kit and the wall that it is made of. All places are those of the model as it was given.
+/// Finished kit and the wall that it is made of. Places are in the space of the model as given.
 #[non_exhaustive]
 pub struct Design {
-    /// The pieces, their plan and the verdict on them.
+    /// Pieces, their plan and their verification.
     pub kit: Kit,
     /// Parameters of the stages that made it, for its own wall and division. Those that only a cut key has
     /// are left out.
     pub settings: Settings,
-    /// How its key was cut; `None` where the key is one of the pieces.
+    /// Site where the key was cut; `None` if the key is one of the pieces.
     pub key: Option<KeySite>,
-    /// Strength of the wall; `None` if the stress could not be computed, of which a warning tells.
+    /// Stress analysis of the wall; `None` if the stress could not be computed, which is warned of.
     pub strength: Option<Strength>,
-    /// How near pieces come, at rest and on their way.
+    /// Gaps between pieces, at rest and on their ways out.
     pub gaps: KitGaps,
-    /// How far faces may stand out as they are printed, and what becomes of the play where they stand back.
+    /// Tolerance of the kit to printing errors, and its play if faces are printed too far inwards.
     pub fit: PrintedFit,
     /// Places of each piece that are too thin to print well, the longest first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
-    /// Cost of the whole job, with all that was tried in vain.
+    /// Cost of the whole job, including all failed trials.
     pub effort: Effort,
-    /// Warnings about this kit; those of kits that were given up are dropped.
+    /// Warnings about this kit. Those of kits that were given up are left out.
     pub warnings: Vec<Warning>,
 }
 
-/// Effect of a printer's error on a kit.
+/// Effect of printing errors on a kit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PrintedFit {
-    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces,
-    /// at rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces
-    /// cross; `None` where no two pieces come near.
+    /// Largest distance by which every printed face may lie too far outwards, mm. Half of the least gap
+    /// between two pieces, at rest and on any way out; gaps of a key with ribs or bumps, which press on
+    /// purpose, do not count. ≤ 0 if surfaces cross; `None` if no two pieces come near each other.
     pub within_mm: Option<f64>,
-    /// The piece that rattles most where all faces stand back by as much, and how far, for small motions;
-    /// play without end where it comes loose. `None` for kits that fail anyway.
+    /// Piece with the most play, for small motions, if every face lies `within_mm` too far inwards, and that
+    /// play; endless if the piece comes loose. `None` if the kit fails, or if `within_mm` is not positive.
     pub loosest: Option<(PatchId, Play)>,
 }
 
 /// End of the job.
 pub enum DesignOutcome {
-    /// There is a kit; its verification says whether it passed.
+    /// A kit was made. It may have failed its verification.
     Made(Box<Design>),
     /// No plan was found for any division that was tried.
     NoPlan {
-        /// Reason in words for people.
+        /// Reason why there is no plan, for people.
         reason: String,
-        /// Pieces that are in the way of others.
+        /// Pieces that block the way out of others.
         blockers: Vec<Blocker>,
         /// True if the time was over before all was tried: with more of it one may be found.
         is_cut_short: bool,
@@ -78,7 +78,7 @@ pub enum DesignOutcome {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct NoPlan {
-    /// Reason in words for people.
+    /// Explanation of the failure, for people.
     pub reason: String,
     /// True if the time was over before all was tried: with more of it one may be found.
     pub is_cut_short: bool,
@@ -121,8 +121,8 @@ impl<T> Best<T> {
         }
     }
 
-    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far; of equals
-    /// the earlier stays.
+    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far. Of equals,
+    /// the earlier one stays.
     pub fn offer(
         &mut self,
         end: T,
@@ -262,7 +262,7 @@ impl Best<Planned> {
 }
 
 impl Best<Kit> {
-    /// Concludes a job: measures what is left to know of the best kit, and collects its warnings.
+    /// Concludes a job: completes the measurements of the best kit, and collects its warnings.
     pub fn conclude(
         self,
         ctx: &Ctx,
@@ -343,7 +343,7 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
     })
 }
 
-/// Warns of a cut key that slides on nothing, or of a piece that is the key since none could be cut.
+/// Warns of a cut key without rails, or of a piece that became the key because none could be cut.
 fn key_warning(
     input: &Input<'_>,
     kit: &Kit,
@@ -367,7 +367,7 @@ fn key_warning(
     }
 }
 
-/// Says why a piece as it is became the key.
+/// Warns that an uncut piece became the key, with the reasons.
 fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     let key = kit.plan.key();
     Warning {
@@ -386,7 +386,7 @@ pub(super) fn time_up(kits: usize) -> Warning {
     }
 }
 
-/// Says in a reason that the time was over.
+/// Adds to a reason that the time was over.
 pub(super) fn report_lateness(reason: &str) -> String {
     match reason {
         "" => "the time was over (--time)".to_owned(),
@@ -394,7 +394,7 @@ pub(super) fn report_lateness(reason: &str) -> String {
     }
 }
 
-/// Says that a key slides on nothing.
+/// Warns that a cut key has no rails.
 fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
     let key = kit.plan.key();
     Warning {
@@ -404,7 +404,7 @@ fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
     }
 }
 
-/// Says which pieces have sheets that may break off or slots that may fuse.
+/// Warns of pieces with sheets that may break off or slots that may fuse.
 fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
     let all = || thin.as_slice().iter().flatten();
     let longest = all().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
@@ -444,7 +444,7 @@ impl PrintedFit {
     }
 }
 
-/// Half of the least gap that is to be one, mm.
+/// Returns half of the least gap between pieces that do not press on purpose, mm.
 fn fits_within_mm(kit: &Kit, gaps: &KitGaps) -> Option<f64> {
     let (key, presses) = (kit.plan.key(), !kit.press_fits.is_empty());
     let is_pressed = |a: PatchId, b: PatchId| presses && (a == key || b == key);
@@ -464,9 +464,10 @@ fn fits_within_mm(kit: &Kit, gaps: &KitGaps) -> Option<f64> {
         .map(|gap_mm| 0.5 * gap_mm)
 }
 
-/// Says where finished pieces cross that are not meant to press: on a way out, or at rest.
+/// Warns of the deepest crossing of finished pieces, on a way out or at rest, unless it is a key
+/// with press fits that crosses.
 fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
-    /// Less is rounding, mm.
+    /// Least depth that is not rounding, mm.
     const LEAST_MM: f64 = 0.02;
     let deepest = gaps
         .paths
@@ -484,7 +485,7 @@ fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
     })
 }
 
-/// Why the job could not be done.
+/// Reason why the job could not be done.
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
     /// No thickness can be found.
@@ -505,7 +506,7 @@ pub enum DesignError {
     /// A piece cannot be finished.
     #[error(transparent)]
     Piece(PieceError),
-    /// Hardly anything of it can be hollow.
+    /// Too little of the model can be hollow.
     #[error(transparent)]
     TooThin(#[from] TooThin),
     /// Connectors have no room behind the thinnest walls.
@@ -522,7 +523,7 @@ pub enum DesignError {
     Cancelled(#[from] Cancelled),
 }
 
-/// A stage's error becomes the job's; a stop inside of a stage is a stop of the job.
+/// Converts errors of stages into errors of the job. A stop within a stage stops the job.
 macro_rules! from_stage {
     ($($stage:ident => $variant:ident),+ $(,)?) => {$(
         impl From<$stage> for DesignError {

@@ -1,5 +1,5 @@
 //! Outlook of a division before anything is made of it: the pieces as they will be cut, places for a key, and
-//! whether there is a plan. Takes a second where a kit takes a minute.
+//! whether there is a plan. An outlook takes a second, a kit takes a minute.
 
 use shellock_geom::{Solid, Vec3};
 
@@ -29,7 +29,7 @@ pub struct Outlook {
 
 /// Verdict on a division.
 pub enum Verdict {
-    /// It has a plan.
+    /// The division has a plan.
     Locks {
         /// The pieces with the key, numbered as they are installed.
         surface: SegmentedSurface,
@@ -38,11 +38,11 @@ pub enum Verdict {
         /// Site of the key; `None` if it is one of the pieces.
         key: Option<KeySite>,
     },
-    /// No plan was found.
+    /// No plan was found with the keys that were tried.
     Blocked {
-        /// Reason in words for people.
+        /// Reason why there is no plan, for people.
         reason: String,
-        /// Pieces that are in the way of others: ids of `surface`.
+        /// Pieces that block the way out of others, as ids of `surface`.
         blockers: Vec<Blocker>,
         /// The pieces of the first key that was tried.
         surface: SegmentedSurface,
@@ -127,7 +127,7 @@ pub fn outlook(
 }
 
 impl Verdict {
-    /// A division that locks is better than one that is blocked; of several blocked ones the first is kept.
+    /// Grades a division that locks above one that is blocked. Of several blocked ones, the first is kept.
     fn grade(&self) -> Grade {
         Grade {
             n_failures: usize::from(matches!(self, Self::Blocked { .. })),
@@ -187,7 +187,7 @@ mod tests {
         params
     }
 
-    /// Returns whether it locks, and the number of its pieces.
+    /// Returns true if the division locks, and the number of its pieces, 0 if it is blocked.
     fn told(outlook: &Outlook) -> (bool, usize) {
         match &outlook.verdict {
             Verdict::Locks { surface, plan, .. } => {

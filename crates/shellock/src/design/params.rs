@@ -6,8 +6,8 @@ use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
 use crate::segmentation::{KeepWhole, Method};
 
-/// Everything that a user may set, each once; what stages are given follows from it, see
-/// [`Settings`](super::Settings).
+/// Parameters that a user may set, each once. [`Settings`](super::Settings) derives the parameters of
+/// each stage from them.
 ///
 /// ```
 /// let mut params = shellock::Params::default();
@@ -21,41 +21,41 @@ pub struct Params {
     pub seed: u64,
     /// Method that divides a model without labels; [`Method::Auto`], which cuts where people would.
     pub method: Method,
-    /// Number of pieces that automatic segmentation begins with. [2, 128]; `None`: the method's choice, or by
-    /// the area with [`Method::Creases`], 10 for a figure of 150 mm.
+    /// Number of pieces that automatic segmentation begins with. [2, 128]; `None`: as many as the method
+    /// finds. [`Method::Creases`] then takes the number from the area, 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
-    /// Regions that no seam is to divide; none.
+    /// Regions that no seam may divide; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// True to divide both sides of a model's plane of symmetry alike, by [`Method::Auto`] and
-    /// [`Method::RandomCuts`]; false.
+    /// True to divide both sides of a model's plane of symmetry alike; false. Only for [`Method::Auto`] and
+    /// [`Method::RandomCuts`].
     pub symmetric: bool,
-    /// Upward direction of the standing model; a key underneath is preferred. Any length but 0; +z.
+    /// Up direction of the standing model, of any length but 0; +z. A key underneath is preferred.
     pub up: [f64; 3],
-    /// Source of the wall's thickness; 2 mm.
+    /// Choice of the wall thickness; 2 mm.
     pub thickness: Thickness,
-    /// Material that pieces are printed of.
+    /// Material of the printed pieces.
     pub material: Material,
-    /// Height of the fall that the wall is to bear, m. [0.01, 20]; 1.275.
+    /// Height of the fall that the wall must withstand, m. [0.01, 20]; 1.275.
     pub drop_m: f64,
-    /// Source of the key; cut out of the surface.
+    /// Choice of the key; cut out of the surface.
     pub key: KeySource,
-    /// True to cut a notch for a fingernail into a key that is cut; false.
+    /// True to give a cut key a notch for a fingernail; false.
     pub has_grip: bool,
-    /// Engraving of the pieces' numbers; `None` for no numbers.
+    /// Strokes of the engraved piece numbers; `None` engraves none.
     pub label: Option<LabelParams>,
-    /// Shape and clearance of connectors.
+    /// Shape and fit of the connectors.
     pub connector: ConnectorParams,
-    /// Distance by which each side of a seam is set back, mm. [0, 0.4]; 0.05.
+    /// Distance by which each side of a seam stays back from the cut, mm. [0, 0.4]; 0.05.
     pub seam_gap_mm: f64,
-    /// Spacing of the grid that fields live on, mm. (0, thickness / 2]; `None` takes the thickness over 2.5.
+    /// Spacing of the grid on which fields are sampled, mm. (0, thickness / 2]; `None`: thickness / 2.5.
     pub cell_mm: Option<f64>,
-    /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
+    /// Budget of the exact search for a plan, in pieces revised. [0, 10⁹]; 100 000.
     pub proof_budget: usize,
-    /// True to make pieces even if little of the model can be hollow; false.
+    /// True to make pieces even if the model is too thin for a cavity or for connectors; false.
     pub allows_thin: bool,
-    /// True to search for the play of all pieces together, too; false.
+    /// True to measure the play of all pieces together, too; false.
     pub is_play_together: bool,
-    /// Bounds on the kits that are made after one fails its verification.
+    /// Limits on planning and making another kit after one failed its verification.
     pub rounds: Rounds,
 }
 
@@ -86,18 +86,18 @@ impl Default for Params {
 }
 
 impl Params {
-    /// Lists the problems of all stages, in words; empty if there are none.
+    /// Lists every problem of every stage, in words. Empty if the parameters are valid.
     pub fn problems(&self) -> Vec<String> {
         super::settings::problems(self)
     }
 }
 
-/// Source of the wall's thickness.
+/// Choice of the wall thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
-    /// Thickness given by the user, mm, in [0.8, 10]; its stress is reported.
+    /// Thickness that the user gives, mm, in [0.8, 10]. The stress in the wall is reported.
     Mm(f64),
-    /// Least thickness that withstands a fall.
+    /// Thinnest wall that withstands the fall.
     Auto,
 }
 
@@ -107,19 +107,19 @@ impl Default for Thickness {
     }
 }
 
-/// Source of the key.
+/// Choice of the key, the piece installed last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
-    /// Cut out of the surface where the key slides best, see [`crate::key`]; if no such kit passes, as with
-    /// `Flattest`.
+    /// Cut out of the surface where it slides best, see [`crate::key`]. If no such kit passes, the key is
+    /// chosen as with `Flattest`.
     #[default]
     Cut,
-    /// Cut as near as possible to a place in the model's space, mm.
+    /// Cut out of the surface as near as possible to this point of the model, mm.
     CutNear([f64; 3]),
-    /// Flattest of the pieces that work as the key.
+    /// Flattest piece that works as a key.
     Flattest,
-    /// The piece with this label, where labels are given; else the one that has this number, from 1, once the
-    /// model is divided (as `shellock segment` numbers them).
+    /// Piece with this label, if labels are given. Otherwise the piece with this number, from 1, in the
+    /// divided model (as `shellock segment` numbers them).
     Piece(i64),
 }
 
@@ -130,19 +130,19 @@ impl KeySource {
     }
 }
 
-/// Bounds on the kits of a job.
+/// Limits of the feedback loop: kits made, and segmentations revised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
-    /// Kits made for one segmentation, at most. ≥ 1; 3.
+    /// Most kits made for one segmentation. ≥ 1; 3.
     pub kits: usize,
-    /// Segmentations revised after the first, at most; 4.
+    /// Most segmentations revised after the first; 4.
     pub refinements: usize,
-    /// Kits made of all segmentations, at most. ≥ 1; 8.
+    /// Most kits made of all segmentations. ≥ 1; 8.
     pub kits_in_all: usize,
 }
 
 impl Rounds {
-    /// Returns the smaller bound of `self` and `other`, each by itself.
+    /// Returns the smaller of each pair of limits.
     pub fn least(&self, other: &Self) -> Self {
         Self {
             kits: self.kits.min(other.kits),

@@ -1,4 +1,4 @@
-//! Settings of the stages, resolved once from the user's parameters and the strength of the wall.
+//! Parameters of each stage, resolved once from the user's parameters and the wall thickness.
 
 use super::{Params, Thickness};
 use crate::body::BodyParams;
@@ -12,31 +12,31 @@ use crate::strength::StrengthParams;
 use crate::verify::VerifyParams;
 use crate::{LatticeDirection, PatchId};
 
-/// Parameters of each stage. No stage changes them. A kit whose key is cut has some of its own, see
-/// `with_key`.
+/// Parameters of each stage. The stages do not change them. A kit whose key is cut overrides some of them,
+/// see `with_key`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Parameters of the wall's stress.
+    /// Parameters of the stress analysis of the wall.
     pub strength: StrengthParams,
-    /// Parameters of the division.
+    /// Parameters of the division into pieces.
     pub segmentation: SegmentationParams,
-    /// Parameters of connector sizes.
+    /// Parameters of the choice of connector sizes.
     pub sizes: SizeParams,
-    /// Parameters of the plan.
+    /// Parameters of the search for a plan.
     pub plan: PlanParams,
-    /// Parameters of the wall.
+    /// Parameters of the wall and its split into shell bodies.
     pub body: BodyParams,
-    /// Parameters of the connectors.
+    /// Parameters of the connectors' shape and fit.
     pub connector: ConnectorParams,
-    /// Parameters of the verdict.
+    /// Parameters of the verification of finished pieces.
     pub verify: VerifyParams,
-    /// Parameters of the play.
+    /// Parameters of the measurement of play.
     pub play: PlayParams,
 }
 
 impl Settings {
-    /// Returns the settings for `params`. A thickness that is still to be found counts as 2 mm.
+    /// Resolves the settings for `params`. A thickness that is still to be found counts as 2 mm.
     pub fn resolve(params: &Params) -> Self {
         let thickness_mm = match params.thickness {
             Thickness::Mm(mm) => mm,
@@ -45,7 +45,7 @@ impl Settings {
         Self::with_thickness(params, thickness_mm)
     }
 
-    /// Returns the settings for a wall of this thickness, mm.
+    /// Resolves the settings for a wall of this thickness, mm, whatever `params` say of it.
     pub fn with_thickness(params: &Params, thickness_mm: f64) -> Self {
         let Params {
             seed,
@@ -96,7 +96,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings for pieces of which `key` was cut to leave along `slide` alone.
+    /// Returns these settings for pieces of which `key` was cut so that it leaves along `slide` alone.
     pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
         let key_gap_mm = self.body.seam_gap_mm.max(0.5 * self.connector.key_clearance_mm);
         Self {
@@ -113,7 +113,8 @@ impl Settings {
         }
     }
 
-    /// Returns the least gaps of finished pieces: those of connectors or of walls, whichever are narrower.
+    /// Returns the least gaps that finished pieces must keep: those of connectors or of walls, whichever are
+    /// narrower.
     pub(super) fn relief(&self) -> Relief {
         let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.seam_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
@@ -124,7 +125,7 @@ impl Settings {
     }
 }
 
-/// Lists the problems of all stages, in words. A value that follows from others is not reported twice.
+/// Lists every problem of every stage, in words. Values derived from others are not reported twice.
 pub(super) fn problems(params: &Params) -> Vec<String> {
     let settings = Settings::resolve(params);
     let label = params.label.map_or_else(Vec::new, |l| l.problems());
@@ -140,7 +141,7 @@ pub(super) fn problems(params: &Params) -> Vec<String> {
     problems
 }
 
-/// Takes the user's parameters of the division.
+/// Returns the user's parameters of the division, with defaults for the others.
 fn segmentation(params: &Params) -> SegmentationParams {
     SegmentationParams {
         method: params.method,
@@ -152,7 +153,7 @@ fn segmentation(params: &Params) -> SegmentationParams {
     }
 }
 
-/// Takes the user's parameters of the plan.
+/// Returns the user's parameters of the plan, with defaults for the others.
 fn plan(params: &Params) -> PlanParams {
     let Params {
         seed,
@@ -168,8 +169,8 @@ fn plan(params: &Params) -> PlanParams {
     }
 }
 
-/// Sets the limits of the wall. A seam's pin needs two printed lines on either side, or three in all if the
-/// model is thin.
+/// Returns the fall that the wall must withstand, and the range of its thickness. The usual least is four
+/// printed lines, two on either side of a seam's pin; where the model is thin, three in all.
 fn strength(params: &Params) -> StrengthParams {
     const LEAST_WALLS: f64 = 4.0;
     const THIN_WALLS: f64 = 3.0;

@@ -1,5 +1,5 @@
-//! Changes before a kit is made, if the strongest plan is weaker than what is asked: larger connectors where
-//! it gives way, then a thicker wall, then other pieces.
+//! Changes before a kit is made, if the strongest plan is weaker than asked: larger connectors where the plan
+//! fails, then a thicker wall, then other pieces.
 //!
 //! The same plan is first rated with each change. Then planning begins anew with it.
 
@@ -133,8 +133,8 @@ impl Rating<'_> {
     }
 
     /// Enlarges, to the largest that fits, the connectors of every pair that opens under a load which the kit
-    /// does not bear; repeats, since another pair may then open first. Returns the best round's sizes and its
-    /// least load factor.
+    /// does not withstand. Repeats, since another pair may then open first. Returns the best round's sizes
+    /// and its least load factor.
     fn enlarge(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), DesignError> {
         let aim = self.asked + AIM;
         let mut best = (self.division.chosen.clone(), least(bears));

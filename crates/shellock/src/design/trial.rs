@@ -1,5 +1,5 @@
-//! A trial: one division of the model with one key, one wall and one set of connectors, and what was learned
-//! of it.
+//! A trial: one division of the model with one key, one wall and one set of connectors, and the lessons from
+//! it.
 //!
 //! A change replaces one layer of the trial and all layers that are made from it; the others are kept.
 
@@ -27,7 +27,7 @@ pub(super) enum Change {
     Enlarge(ChosenSizes),
     /// Other pieces, which one of the joining steps or [`Step::Divide`] made, and a warning of that.
     Divide(Step, SegmentedSurface, Option<Warning>),
-    /// A wall that is thicker.
+    /// A thicker wall, with its reason.
     Thicken(Thicker),
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Divides the model by the wall's settings.
+    /// Divides the model into pieces with this wall.
     pub fn new(ctx: &Ctx, input: Input<'a>, wall: Arc<Wall>) -> Result<Self, DesignError> {
         let params = &wall.settings.segmentation;
         let surface = segmentation::segment(&ctx.fork(), params, input.model, input.labels)?;
@@ -131,7 +131,7 @@ impl Learned {
     }
 }
 
-/// Pieces of one key, and all that is known of them.
+/// Pieces of one key, with their survey and lessons.
 pub(super) struct Setup<'a> {
     pub candidate: Candidate<'a>,
     pub division: Division,
@@ -314,8 +314,8 @@ impl<'a> Trial<'a> {
         Ok(None)
     }
 
-    /// Takes other pieces. If no key can be cut of joined pieces, keeps those that are, and joins no others
-    /// for that reason.
+    /// Takes other pieces. If no key can be cut out of joined pieces, keeps the present ones and joins no
+    /// others for the same reason.
     fn use_pieces(
         &mut self,
         ctx: &Ctx,
@@ -373,7 +373,8 @@ impl Setup<'_> {
         Ok(())
     }
 
-    /// Forgets what was learned and measured of other pieces, and makes sure that connectors will have room.
+    /// Forgets lessons and measurements of other pieces, and makes sure that connectors will
+    /// have room.
     fn begin_division(&mut self) {
         let Division { settings, chosen, .. } = &self.division;
         (self.survey, self.learned) = (None, Learned::default());

@@ -42,11 +42,11 @@ impl Way {
 /// Thickness of walls: that a kit locks comes before what it withstands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Walls {
-    /// As a fall asks for; thicker for the sake of use, if such a kit passes.
+    /// Thickness that a fall asks for, or a thicker wall for the sake of use, if such a kit passes.
     ForUse,
-    /// As a fall asks for.
+    /// Thickness that a fall asks for.
     ForFalls,
-    /// As thin as walls are made, so that connectors have the most room.
+    /// Least thickness of walls, so that connectors have the most room.
     Thin,
 }
 

@@ -120,7 +120,7 @@ impl SegmentedSurface {
     /// Contact graph in which contacts count if their longest stretch is at least `min_contact_mm`.
     ///
     /// # Panics
-    /// As [`Self::seams`].
+    /// Panics under the same conditions as [`Self::seams`].
     pub fn contact_graph(&self, min_contact_mm: f64) -> ContactGraph {
         self.contact_graph_below(0.0, min_contact_mm)
     }
@@ -128,7 +128,7 @@ impl SegmentedSurface {
     /// Contact graph with lengths measured on the inner side of a wall of `wall_mm`, where connectors are.
     ///
     /// # Panics
-    /// As [`Self::seams`].
+    /// Panics under the same conditions as [`Self::seams`].
     pub fn contact_graph_below(&self, wall_mm: f64, min_contact_mm: f64) -> ContactGraph {
         let lengths = self
             .seams()

@@ -67,8 +67,8 @@ pub enum SegmentationError {
     },
     /// A region to keep whole that leaves too little to divide.
     #[error(
-        "keep-whole: {region} is {:.0} % of the surface, but may be half of it at most: give a smaller \
-         radius, or a label of a smaller part",
+        "keep-whole: {region} is {:.0} % of the surface, but may be half of it at most: \
+         give a smaller radius, or a label of a smaller part",
         100.0 * share
     )]
     KeepWholeTooLarge {

@@ -30,9 +30,10 @@ const THINNEST_PROPOSED_MM: f64 = 0.8;
 /// Error: the model is too thin for walls of that thickness.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "only {:.0} % of the surface has room for a cavity behind walls of {wall_mm:.2} mm: the model is too \
-     thin to be hollow; make it about {size_mm:.0} mm large (--size) or its walls {better_mm:.2} mm thin \
-     (--thickness) at most, or print it as it is (--allow-thin makes pieces all the same)",
+    "only {:.0} % of the surface has room for a cavity behind walls of {wall_mm:.2} mm: \
+     the model is too thin to be hollow; make it about {size_mm:.0} mm large (--size) \
+     or its walls {better_mm:.2} mm thin (--thickness) at most, \
+     or print it as it is (--allow-thin makes pieces all the same)",
     100.0 * share
 )]
 pub struct TooThin {
@@ -49,11 +50,9 @@ pub struct TooThin {
 /// Error: connectors have no room behind walls of that thickness.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "half of the model is no thicker than {thickness_mm:.1} mm, and nowhere is room for connectors behind \
-     walls of \
-     {wall_mm:.2} mm: make it about {size_mm:.0} mm large (--size){}, or print it as it is \
-     (--allow-thin makes pieces all \
-     the same)",
+    "half of the model is no thicker than {thickness_mm:.1} mm, and nowhere is room for connectors \
+     behind walls of {wall_mm:.2} mm: make it about {size_mm:.0} mm large (--size){}, \
+     or print it as it is (--allow-thin makes pieces all the same)",
     thinner(*better_mm)
 )]
 pub struct NoRoom {

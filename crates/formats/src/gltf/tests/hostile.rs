@@ -91,9 +91,7 @@ fn a_sparse_accessor_reserves_only_what_triangles_use() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 2000,
-        failure_persistence: None,
-        ..ProptestConfig::default()
+        cases: 2000, failure_persistence: None, ..ProptestConfig::default()
     })]
 
     #[test]
