@@ -1,7 +1,7 @@
 //! The whole job: from a closed mesh to interlocking pieces that were verified.
 //!
-//! One loop makes kits until one is good: the [`agenda`] says what is tried next, a [`trial`] makes that
-//! change, and an [`attempt`] plans and makes the kit and returns what may help if it fails.
+//! One loop makes kits until one is good: the `agenda` says what is tried next, a `trial` makes that
+//! change, and an `attempt` plans and makes the kit and returns what may help if it fails.
 //!
 //! ```text
 //!               change                     found
