@@ -394,7 +394,7 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     fs::write(&plan, "{ \"pieces\": [").unwrap();
     refused(&["plan.json", "not a plan"]);
     fs::write(&plan, "{}").unwrap();
-    refused(&["plan.json", "no list of pieces"]);
+    refused(&["plan.json", "build the kit again"]);
     fs::write(&plan, twice).unwrap();
     refused(&["plan.json", "names piece 1 twice"]);
     fs::write(&plan, TWO_PIECES).unwrap();

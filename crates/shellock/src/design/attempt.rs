@@ -142,14 +142,17 @@ pub(super) fn make_kit(
     Ok(Found { late, ..found })
 }
 
-/// Returns the plan to make, with the step that a lack of time rules out, or the changes to make instead.
+/// A plan to make, with the step that a lack of time rules out; or the changes to make instead.
+type Decision<T> = Result<(Chosen, Option<Step>), Found<T>>;
+
+/// Decides on the plan that was sought, or on the changes to make instead.
 fn plan_or_changes<T>(
     ctx: &Ctx,
     division: &Division,
     learned: &Learned,
     next: Next,
     allowance: &Allowance,
-) -> Result<Result<(Chosen, Option<Step>), Found<T>>, DesignError> {
+) -> Result<Decision<T>, DesignError> {
     Ok(Err(match next {
         Next::Plan(chosen, late) => return Ok(Ok((*chosen, late))),
         Next::Changes(changes, late) => Found {
