@@ -330,7 +330,14 @@ impl Agenda {
             outwards.push(Step::NextWay);
         }
         for &step in offers.iter().chain(&outwards) {
-            match self.permit(ctx, step) {
+            // A change before a kit was allowed when its trial began. Without it the trial would end in nothing.
+            let permit = match step {
+                Step::Enlarge | Step::JoinPredicted | Step::JoinWeak | Step::Thicken => {
+                    self.permit_at_any_time(step)
+                }
+                _ => self.permit(ctx, step),
+            };
+            match permit {
                 Permit::Yes => return Some(step),
                 Permit::Late => self.skip(ctx, step),
                 Permit::No => {}
@@ -439,12 +446,18 @@ impl Agenda {
     }
 
     fn permit(&self, ctx: &Ctx, step: Step) -> Permit {
-        if self.forbidden.contains(&step) || self.count(step) >= self.limit(step) || !self.makes_sense(step) {
-            Permit::No
-        } else if self.is_late(ctx, step) {
-            Permit::Late
-        } else {
-            Permit::Yes
+        match self.permit_at_any_time(step) {
+            Permit::Yes if self.is_late(ctx, step) => Permit::Late,
+            permit => permit,
+        }
+    }
+
+    /// Permit by the table and by what the kits were like, whatever the time.
+    fn permit_at_any_time(&self, step: Step) -> Permit {
+        let is_left = self.count(step) < self.limit(step);
+        match is_left && !self.forbidden.contains(&step) && self.makes_sense(step) {
+            true => Permit::Yes,
+            false => Permit::No,
         }
     }
 

@@ -407,11 +407,17 @@ pub(super) fn next_plan(
     let choice = planning.choice(&handling);
     ctx.stage("what would rattle", 0)?;
     let foresight = Foresight::of(&choice, &found);
-    if allowance.is_allowed(Step::JoinPredicted)
+    let mut late = None;
+    if allowance.is_wanted(Step::JoinPredicted)
         && let Some((plan, excess)) = foresight.steadiest()
     {
         let rattling = predicted_to_rattle(plan.plan.key(), excess);
-        if let Some(fewer) = join(ctx, &settings.segmentation, surface, &rattling)? {
+        if !rattling.is_empty() {
+            late = allowance.late(Step::JoinPredicted);
+        }
+        if late.is_none()
+            && let Some(fewer) = join(ctx, &settings.segmentation, surface, &rattling)?
+        {
             let change = Change::Divide(Step::JoinPredicted, fewer, None);
             return Ok(Next::Changes(vec![change], None));
         }
@@ -421,7 +427,8 @@ pub(super) fn next_plan(
         warn_of_key(ctx, planning, &best.found.plan);
     }
     let plan = (&best.found.pool[0], &best.holding);
-    let (changes, late) = strengthen(ctx, planning, &handling, plan, allowance)?;
+    let (changes, late_change) = strengthen(ctx, planning, &handling, plan, allowance)?;
+    let late = late.or(late_change);
     Ok(match changes.is_empty() {
         true => Next::Plan(Box::new(best), late),
         false => Next::Changes(changes, late),

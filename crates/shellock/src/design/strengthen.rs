@@ -58,7 +58,8 @@ pub(super) fn strengthen(
     {
         return Ok((vec![Change::Enlarge(sizes.clone())], None));
     }
-    let (mut changes, mut late) = (Vec::new(), None);
+    let mut changes = Vec::new();
+    let mut late = allowance.late(Step::Enlarge).or(allowance.late(Step::JoinWeak));
     let (sizes, borne) = match &larger {
         Some((sizes, borne)) => (sizes, *borne),
         None => (&division.chosen, before),

@@ -337,3 +337,22 @@ fn a_thicker_wall_is_tried_only_if_as_much_time_is_left_as_the_present_one_has_t
         assert_eq!(agenda.is_cut_short(), permit == Permit::Late);
     }
 }
+
+#[test]
+fn a_change_before_a_kit_is_made_though_the_time_ends_and_then_no_more_are_allowed() {
+    let gone_s = AtomicU64::new(0);
+    let left = || 10.0 - gone_s.load(Relaxed) as f64;
+    let ctx = Ctx::quiet().with_deadline(&left);
+    let mut agenda = Agenda::with(left(), four_ways()[..1].to_vec(), Rounds::default(), Vec::new());
+    agenda.set_keys(1);
+    for step in [Step::Enlarge, Step::JoinPredicted, Step::JoinWeak] {
+        gone_s.store(0, Relaxed);
+        assert!(agenda.allowance(&ctx).is_allowed(step));
+        gone_s.store(20, Relaxed);
+        let offer = offering(Report::default(), &[step]);
+        assert_eq!(agenda.next(&ctx, &offer), Some(step));
+    }
+    let late = agenda.allowance(&ctx);
+    assert!(!late.is_allowed(Step::Enlarge) && !late.is_allowed(Step::JoinPredicted));
+    assert!(!agenda.is_cut_short(), "nothing was left out so far");
+}
