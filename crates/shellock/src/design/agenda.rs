@@ -330,7 +330,8 @@ impl Agenda {
             outwards.push(Step::NextWay);
         }
         for &step in offers.iter().chain(&outwards) {
-            // A change before a kit was allowed when its trial began. Without it the trial would end in nothing.
+            // A change before a kit was allowed when its trial began. Without it the trial would end in
+            // nothing.
             let permit = match step {
                 Step::Enlarge | Step::JoinPredicted | Step::JoinWeak | Step::Thicken => {
                     self.permit_at_any_time(step)
