@@ -431,7 +431,6 @@ impl Agenda {
             Step::Divide => rounds.refinements,
             Step::NextKey => self.n_keys.saturating_sub(1),
             Step::NextWay => self.ways.len() - 1,
-            _ if self.forbidden.contains(&step) => 0,
             _ => ANY,
         };
         let [cut, piece] = TABLE[step as usize].most;
