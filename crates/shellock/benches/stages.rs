@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use divan::{Bencher, black_box};
+use made::Made;
 use shellock::body::{BodyParams, PatchDistances, ShellGrid};
 use shellock::design::{Params, design};
 use shellock::figure::{Figure, make};
@@ -22,8 +23,6 @@ use shellock_mechanics::Material;
 use shellock_render::ReportPiece;
 use shellock_render::palette::color;
 use shellock_render::pieces_picture;
-
-use made::Made;
 
 fn main() {
     divan::main();

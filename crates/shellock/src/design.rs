@@ -29,12 +29,6 @@ mod trial;
 mod wall;
 mod ways;
 
-use shellock_geom::Solid;
-
-use crate::key::Turn;
-use crate::metric::{Chosen, Holding};
-use crate::plan::PlanProof;
-use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
 pub use agenda::Effort;
 use agenda::{Agenda, Allowance, Grade, Report, Step};
 use attempt::Found;
@@ -45,9 +39,15 @@ pub use outcome::{Design, DesignError, DesignOutcome, NoPlan, PrintedFit};
 pub use outlook::{Outlook, Verdict, first_division, outlook};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
+use shellock_geom::Solid;
 use trial::{Change, Parts, Trial};
 use wall::Wall;
 use ways::Input;
+
+use crate::key::Turn;
+use crate::metric::{Chosen, Holding};
+use crate::plan::PlanProof;
+use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) if given. Kits are made until one passes or
 /// nothing else is left to try. Then the best of them is returned with its failures.

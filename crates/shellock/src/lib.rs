@@ -26,32 +26,20 @@
 //! → [`piece`] (finished meshes) → [`mod@verify`], [`play`] and [`certificate`], which know nothing of the
 //! stages before and judge anybody's assembly.
 
-pub mod body;
-pub mod connector;
-pub mod coupon;
 pub mod design;
-pub mod figure;
-pub mod handling;
-mod impact;
-pub mod key;
-pub mod metric;
-pub mod piece;
-pub mod plan;
-pub mod seam;
-pub mod segmentation;
-pub mod sizes;
-pub mod strength;
-pub mod stress_test;
-pub mod surface;
-#[cfg(test)]
-mod testing;
 
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
-pub use seam::graph::{Adjacency, ContactGraph};
 pub use shellock_assembly::{
     Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
     PressFit, PressFitKind, Severity, Verdict, Warning, certificate, context, direction, ids, motion, params,
     play, push, verify, warning,
 };
-pub use sizes::ConnectorSizes;
-pub use surface::{Seam, SegmentedSurface};
+pub use shellock_divide::{key, segmentation};
+pub use shellock_figures as figure;
+pub use shellock_make::{body, connector, coupon, piece};
+pub use shellock_plan as plan;
+pub use shellock_plan::sizes::{self, ConnectorSizes};
+pub use shellock_rate::{handling, metric, strength, stress_test};
+pub use shellock_surface as surface;
+pub use shellock_surface::seam::graph::{Adjacency, ContactGraph};
+pub use shellock_surface::{Seam, SegmentedSurface, seam};

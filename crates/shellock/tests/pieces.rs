@@ -6,6 +6,7 @@ mod made;
 
 use std::sync::LazyLock;
 
+use made::Made;
 use shellock::connector::{self, Run};
 use shellock::plan::interface::contacts;
 use shellock::seam::rules::SHORTEST_RUN_SIZES;
@@ -15,8 +16,6 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_testkit::shapes::sphere;
-
-use made::Made;
 
 fn egg() -> &'static Solid {
     static EGG: LazyLock<Solid> =

@@ -9,13 +9,16 @@ use crate::problem::Problem;
 use crate::{cargo, words};
 
 /// Crates with fast unit tests: 0.01 to 7 s each on one core, 30 s in all. Those of `shellock` take 80 s.
-const FAST: [&str; 13] = [
+const FAST: [&str; 16] = [
     "shellock-geom",
     "shellock-formats",
     "shellock-mechanics",
     "shellock-segment",
+    "shellock-figures",
     "shellock-assembly",
     "shellock-render",
+    "shellock-surface",
+    "shellock-plan",
     "shellock-print",
     "shellock-kit",
     "shellock-studio",

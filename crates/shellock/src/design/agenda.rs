@@ -17,14 +17,14 @@ mod table;
 mod tests;
 
 use serde::{Deserialize, Serialize};
+pub(super) use table::Step;
+use table::{ANY, Level, TABLE};
 
 use super::Thickness;
 use super::params::Rounds;
 use super::ways::{Input, Walls, Way, ways};
 use crate::Ctx;
 use crate::sizes::SizeChoice;
-pub(super) use table::Step;
-use table::{ANY, Level, TABLE};
 
 /// Number of places at which a key is cut before a piece becomes the key: if the best place fails, others
 /// seldom help.

@@ -52,7 +52,7 @@ impl<'a> Candidate<'a> {
         };
         let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
         let key = Some(CutKey {
-            site: turn.site(site, along),
+            site: site.rotate(&turn, along),
             along,
         });
         let mut turned = Self { key, ..as_it_lies };
@@ -106,7 +106,7 @@ impl<'a> Candidate<'a> {
     fn settings(&self, job: &Job<'_>) -> Settings {
         let mut settings = job.settings().clone();
         for region in &mut settings.segmentation.keep_whole {
-            *region = self.turn.region(region);
+            *region = region.rotate(&self.turn);
         }
         settings
     }

@@ -176,10 +176,11 @@ fn judge(ctx: &Ctx, parts: Parts<'_, '_>, _: &Allowance) -> Result<Found<Verdict
 
 #[cfg(test)]
 mod tests {
+    use shellock_test_surfaces::{sphere, voronoi};
+
     use super::*;
     use crate::figure::{Figure, make};
     use crate::segmentation::Method;
-    use crate::testing::{sphere, voronoi};
 
     fn params(n_pieces: usize) -> Params {
         let mut params = Params::default();

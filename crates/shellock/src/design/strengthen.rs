@@ -218,6 +218,8 @@ fn join(
 
 #[cfg(test)]
 mod tests {
+    use shellock_geom::Vec3;
+
     use super::super::agenda::Agenda;
     use super::super::tests::Ball;
     use super::*;
@@ -227,7 +229,6 @@ mod tests {
     use crate::handling::{Deed, Failure};
     use crate::metric::GivesWay;
     use crate::plan::{LatticePlan, PlanConstraints, PlanScore, survey};
-    use shellock_geom::Vec3;
 
     const N: usize = 4;
 

@@ -5,6 +5,7 @@ mod kits;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use kits::*;
 use shellock_geom::{Solid, Vec3};
 
 use super::attempt::Failure;
@@ -22,8 +23,7 @@ use crate::plan::PlanConstraints;
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
 use crate::verify::Finding;
-use crate::{Cancelled, Cause, LatticeDirection, PatchId, testing};
-use kits::*;
+use crate::{Cancelled, Cause, LatticeDirection, PatchId};
 
 #[test]
 fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
@@ -42,8 +42,8 @@ fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
 
 #[test]
 fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_changed() {
-    let ball = testing::sphere(3, Vec3::splat(20.0));
-    let surface = testing::voronoi(ball, 6, 1);
+    let ball = shellock_test_surfaces::sphere(3, Vec3::splat(20.0));
+    let surface = shellock_test_surfaces::voronoi(ball, 6, 1);
     let (report, stop) = (|_: Progress<'_>| {}, AtomicBool::new(false));
     let ctx = Ctx::new(&report, &stop);
     let params = SegmentationParams::default();
@@ -185,7 +185,7 @@ pub(super) struct Ball {
 impl Ball {
     pub fn new() -> Self {
         Self {
-            model: Solid::new(testing::sphere(3, Vec3::splat(40.0))).unwrap(),
+            model: Solid::new(shellock_test_surfaces::sphere(3, Vec3::splat(40.0))).unwrap(),
             params: Params::default(),
         }
     }
@@ -200,7 +200,7 @@ impl Ball {
 
     /// The ball in `n` pieces.
     pub fn job(&self, n: usize) -> Job<'_> {
-        let surface = testing::voronoi(self.model.mesh().clone(), n, 1);
+        let surface = shellock_test_surfaces::voronoi(self.model.mesh().clone(), n, 1);
         let mut wall = Wall::nominal(&self.params);
         wall.error = Some("a test".to_owned());
         Job::of(self.input(), Arc::new(wall), surface).expect("no key is named")
@@ -346,7 +346,7 @@ fn without_any_plan_the_answer_is_the_failure_with_a_piece_as_the_key() {
 
 /// Runs the loop on a ball whose labels are its two halves, which never lock.
 fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
-    let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
+    let model = Solid::new(shellock_test_surfaces::sphere(3, Vec3::splat(40.0))).expect("closed");
     let mesh = model.mesh();
     let is_upper = |face| i64::from(mesh.face_center(face).z > 0.0);
     let labels: Vec<i64> = (0..mesh.triangles.len()).map(is_upper).collect();

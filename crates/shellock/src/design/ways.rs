@@ -87,9 +87,9 @@ pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
 #[cfg(test)]
 mod tests {
     use shellock_geom::Vec3;
+    use shellock_test_surfaces::sphere;
 
     use super::*;
-    use crate::testing::sphere;
 
     fn ways_with(change: impl Fn(&mut Params), labels: Option<&[i64]>) -> Vec<Way> {
         let model = Solid::new(sphere(3, Vec3::splat(50.0))).expect("closed");

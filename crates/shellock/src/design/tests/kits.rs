@@ -10,7 +10,7 @@ use crate::plan::key::KeyDirections;
 use crate::plan::{LatticePlan, PlanProof, ProofScope};
 use crate::play::{KitPlay, Rattle, Slide};
 use crate::verify::{Check, Finding, Play, Verification};
-use crate::{Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, Warning, testing};
+use crate::{Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, Warning};
 
 pub const N: usize = 3;
 
@@ -52,7 +52,7 @@ pub fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Fi
     };
     let nothing = || ids().map(|_| None).collect::<IdVec<PatchId, Option<Play>>>();
     Kit {
-        surface: testing::voronoi(testing::sphere(2, Vec3::splat(20.0)), N, 1),
+        surface: shellock_test_surfaces::voronoi(shellock_test_surfaces::sphere(2, Vec3::splat(20.0)), N, 1),
         sizes: ConnectorSizes::default(),
         plan,
         proof: PlanProof {

@@ -1,0 +1,110 @@
+//! Moves seams into creases, and shortens them elsewhere.
+//!
+//! Dividing cuts by planes and by equal distance, whatever the shape there. Afterwards each seam is free
+//! within a band and takes the cheapest path. The price is its length, reduced in concave creases
+//! ([`border::prices`]).
+
+use shellock_segment::border;
+
+use super::refine::{Ground, n_faults};
+use super::{FaceLabels, SegmentationParams};
+
+/// Greatest distances that seams may move, mm, in consecutive rounds.
+const BANDS_MM: [f64; 2] = [8.0, 4.0];
+/// Least share of its area that a piece keeps. Without creases, the shortest seam would enclose nothing.
+const LEAST_KEPT: f64 = 0.7;
+
+/// Settles the seams of `labels`. A seam stays where it is if its move would shrink a piece too far, lose
+/// one, cut a region to keep whole, or add a fault.
+pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> FaceLabels {
+    let graph = ground.graph();
+    let settler = border::Settler::new(graph);
+    let mut label = labels.as_slice().to_vec();
+    let areas = |label: &[u32], of: [u32; 2]| {
+        let area = |k: u32| {
+            (0..label.len())
+                .filter(|&f| label[f] == k)
+                .map(|f| graph.area_mm2[f])
+                .sum::<f64>()
+        };
+        of.map(area)
+    };
+    let mut n_before = n_faults(params, ground, labels);
+    for band_mm in BANDS_MM {
+        settler.settle(band_mm, &mut label, |moved, pair| {
+            let (first, now) = (areas(labels.as_slice(), pair), areas(moved, pair));
+            let is_worn = (0..2).any(|side| now[side] < LEAST_KEPT * first[side]);
+            if is_worn || ground.whole.is_parted(moved, pair) {
+                return false;
+            }
+            let connected = FaceLabels::from_connected(&ground.topology, moved);
+            let n_after = n_faults(params, ground, &connected);
+            connected.n_patches() == labels.n_patches() && n_after <= n_before && {
+                n_before = n_after;
+                true
+            }
+        });
+    }
+    FaceLabels::from_connected(&ground.topology, &label)
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::{Solid, Topology, Vec3};
+    use shellock_testkit::shapes::torus;
+
+    use super::*;
+
+    /// A ring whose tube is pinched at both ends of the x axis, where its narrowest sections lie.
+    fn pinched() -> Solid {
+        let mut ring = torus(30.0, 10.0, [72, 24]);
+        for p in &mut ring.points {
+            let axis = Vec3::new(p.x, p.y, 0.0).normalize_or_zero() * 30.0;
+            let pinch = 1.0 - 0.5 * (-(axis.y / 6.0).powi(2)).exp();
+            *p = axis + (*p - axis) * pinch;
+        }
+        Solid::new(ring).expect("closed")
+    }
+
+    fn halves(solid: &Solid, y: f64) -> FaceLabels {
+        let label: Vec<u32> = (0..solid.mesh().triangles.len())
+            .map(|f| u32::from(solid.mesh().face_center(f).y > y))
+            .collect();
+        FaceLabels::from_connected(&Topology::new(solid), &label)
+    }
+
+    #[test]
+    fn seams_move_to_the_narrowest_place_within_reach_and_every_piece_stays() {
+        let solid = pinched();
+        let ground = Ground::new(&solid);
+        let labels = halves(&solid, 5.0);
+        let params = SegmentationParams::default();
+        let settled = settled(&params, &ground, &labels);
+        assert_eq!(settled.n_patches(), labels.n_patches());
+        assert!(n_faults(&params, &ground, &settled) <= n_faults(&params, &ground, &labels));
+        let mesh = solid.mesh();
+        for f in 0..mesh.triangles.len() {
+            let y = mesh.face_center(f).y;
+            assert!(
+                y.abs() < 3.0
+                    || settled.patch(f) == labels.patch(if y > 0.0 { top(&solid) } else { bottom(&solid) }),
+                "{y}"
+            );
+        }
+    }
+
+    fn top(solid: &Solid) -> usize {
+        extreme(solid, 1.0)
+    }
+
+    fn bottom(solid: &Solid) -> usize {
+        extreme(solid, -1.0)
+    }
+
+    fn extreme(solid: &Solid, sign: f64) -> usize {
+        let height = |f: &usize| sign * solid.mesh().face_center(*f).y;
+        (0..solid.mesh().triangles.len())
+            .max_by(|f, g| height(f).total_cmp(&height(g)))
+            .expect("it has triangles")
+    }
+}

@@ -1,0 +1,542 @@
+//! Splitting the wall, piece by piece, in the disassembly sequence.
+
+use std::cell::Cell;
+
+use rayon::prelude::*;
+use shellock_assembly::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
+use shellock_geom::band::Band;
+use shellock_geom::decimate::decimate;
+use shellock_geom::level_cut::{Side, cut_at_zero};
+use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
+use shellock_geom::sweep::Sweeper;
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+use shellock_plan::LatticePlan;
+use shellock_surface::SegmentedSurface;
+
+use super::chips::whole_bodies;
+use super::fragments::Fragments;
+use super::grid::{LocalField, PatchDistances, ShellGrid};
+use super::{BodyError, BodyParams};
+
+/// Depth of a piece's outer skin that other pieces' paths must not take from it, in cells. [geometry notes:
+/// 1.5]
+const SKIN_CELLS: f64 = 1.5;
+/// Cells by which the remaining material is grown before it is swept, so that interpolation leaves no
+/// rubbing.
+const MARGIN_CELLS: f64 = 0.15;
+/// Distance from the key's cut within which a node counts as part of its seam, mm.
+const KEY_REACH_MM: f32 = 1.5;
+/// Limits to the simplification of cutting tools. Where they cut, at most this share of the gap and this many
+/// mm, so that paths stay free. Where they end outside the wall, farther from it than so many cells, the
+/// larger tolerance applies.
+const GAP_SHARE: f64 = 0.2;
+const CUT_TOLERANCE_MM: f64 = 0.02;
+const FREE_TOLERANCE_MM: f64 = 0.05;
+const TIGHT_CELLS: f64 = 1.2;
+/// Distance from the wall at which collars end, in cells, and the slope of that limit, field mm per mm.
+const LIMIT_CELLS: f32 = 1.8;
+const LIMIT_SLOPE: f32 = 5.0;
+/// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
+const COLLAR_CELLS: usize = 3;
+/// Stray points of a part up to which a cut counts as separating it. A cut leaks if, on each side, more
+/// points than this and than 0.5 % of all lie beyond a cell.
+const MOST_STRAY: usize = 10;
+/// Rounds of giving fragments to the other side of a cut. New fragments can appear where p must keep out of
+/// the way of those it gave.
+const MOST_GIVINGS: usize = 4;
+/// Least share of its wall that a piece must be able to take along; below, the piece is blocked.
+const LEAST_KEPT: f64 = 0.5;
+
+/// The separated bodies, and the fields of the separation that later stages need.
+pub struct ShellBodies {
+    /// The body of each piece, one connected volume.
+    pub bodies: IdVec<PatchId, Volume>,
+    /// The inner surface of the wall, each triangle with the piece behind it; `None` where there is no
+    /// cavity.
+    pub inner: Option<SegmentedSurface>,
+    /// Field that is positive where a piece may have no connectors: where bodies block its way out, or where
+    /// it would block a later piece's way. On the nodes around its patch.
+    pub blocked: IdVec<PatchId, LocalField>,
+    /// Field that is positive on each piece's own side of all cuts. Together with the wall's limits it bounds
+    /// the body. On the nodes around its patch.
+    pub side: IdVec<PatchId, LocalField>,
+    /// Distance by which each side of a cut stays back from it, mm, on all nodes.
+    pub gap_mm: Vec<f32>,
+}
+
+/// Splits the wall along the plan. The bodies partition the wall except for the gaps inside the seams.
+pub fn build(
+    ctx: &Ctx,
+    params: &BodyParams,
+    grid: &ShellGrid,
+    distances: &PatchDistances,
+    plan: &LatticePlan,
+    rooms: &IdVec<PatchId, Aabb>,
+) -> Result<ShellBodies, BodyError> {
+    ctx.stage("cuts", plan.steps.len())?;
+    let mut fields = Separation::new(grid, distances, plan.steps.len());
+    let mut inner = InnerSurface::new(grid);
+    let mut cuts: Vec<Cut> = Vec::new();
+    let mut blocked: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
+    let mut side = blocked.clone();
+    for step in plan.removal() {
+        let p = step.piece;
+        let in_way = if fields.n_left() == 1 {
+            inner.give_rest(p);
+            side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &fields.rest, rooms[p]));
+            cuts.push(Cut {
+                piece: p,
+                field: None,
+            });
+            fields.in_later_ways.clone()
+        } else {
+            let g = fields.cut(p, step.separation);
+            let kept = fields.kept_share(p, &g);
+            if kept < LEAST_KEPT {
+                return Err(BodyError::Blocked {
+                    piece: p,
+                    separation: step.separation,
+                    kept,
+                });
+            }
+            let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
+            let ((), local) = rayon::join(|| inner.give(p, &g, &grid.band), local);
+            let own: Vec<f32> = g
+                .par_iter()
+                .zip(&fields.rest)
+                .map(|(g, rest)| g.min(*rest))
+                .collect();
+            side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &own, rooms[p]));
+            cuts.push(Cut {
+                piece: p,
+                field: Some(local),
+            });
+            fields.remove(p, step.separation, &g)
+        };
+        blocked[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
+        ctx.step()?;
+    }
+    ctx.stage("bodies", plan.steps.len())?;
+    let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
+    let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
+    let gap = |n: usize| gap_mm(params, key_side.as_deref(), n);
+    let gap_mm: Vec<f32> = (0..grid.band.len()).into_par_iter().map(gap).collect();
+    let mut parts = split(
+        &Splitter {
+            ctx,
+            params,
+            grid,
+            gap_mm: &gap_mm,
+        },
+        grid.wall.clone(),
+        &cuts,
+    )?;
+    parts.sort_by_key(|(p, _)| *p);
+    let apart_mm = 2.0 * params.seam_gap_mm.max(params.key_gap_mm.unwrap_or(0.0));
+    let parts = whole_bodies(ctx, grid, apart_mm, parts);
+    Ok(ShellBodies {
+        bodies: parts.into_iter().map(|(_, body)| body).collect(),
+        inner: inner.finish(plan.steps.len()),
+        blocked: of_every_piece(blocked),
+        side: of_every_piece(side),
+        gap_mm,
+    })
+}
+
+fn of_every_piece(fields: Vec<Option<LocalField>>) -> IdVec<PatchId, LocalField> {
+    fields
+        .into_iter()
+        .map(|f| f.expect("every piece of a plan is removed once"))
+        .collect()
+}
+
+/// A piece and the field of its cut, positive on its side; `None` for the first-installed piece.
+struct Cut {
+    piece: PatchId,
+    field: Option<LocalField>,
+}
+
+struct Splitter<'a> {
+    ctx: &'a Ctx<'a>,
+    params: &'a BodyParams,
+    grid: &'a ShellGrid,
+    /// Distance by which each side of a cut stays back from it, mm.
+    gap_mm: &'a [f32],
+}
+
+/// Divides `wall` among the pieces of `cuts`, given in the disassembly sequence: first between the earlier
+/// and the later half of them, then each half recursively. Every triangle thus takes part in log n booleans,
+/// not in n.
+fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
+    if let [only] = cuts {
+        with.ctx.step()?;
+        return Ok(vec![(only.piece, wall)]);
+    }
+    with.ctx.check()?;
+    let (leaving, staying) = cuts.split_at(cuts.len() / 2);
+    let g = with.preference(leaving);
+    let (theirs, rest) = rayon::join(|| with.side(&wall, &g, 1.0), || with.side(&wall, &g, -1.0));
+    drop((wall, g));
+    let (a, b) = rayon::join(|| split(with, theirs, leaving), || split(with, rest, staying));
+    let mut parts = a?;
+    parts.extend(b?);
+    Ok(parts)
+}
+
+impl Splitter<'_> {
+    /// Field that is positive on the side of any of the `leaving` pieces.
+    fn preference(&self, leaving: &[Cut]) -> Vec<f32> {
+        let mut g = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
+        for cut in leaving {
+            cut.field
+                .as_ref()
+                .expect("only the last piece has no cut")
+                .raise(&mut g);
+        }
+        g
+    }
+
+    /// The part of `wall` where `sign · g` is positive, less the gap.
+    ///
+    /// A collar along the cut, on its other side, is subtracted from the wall. The wall then falls apart, and
+    /// the parts on the wanted side are kept. The collar has far fewer triangles than a whole side. If the
+    /// collar does not separate the sides, the whole side cuts instead.
+    fn side(&self, wall: &Volume, g: &[f32], sign: f32) -> Volume {
+        // Both collars resolve corners on the same side of the cut, so that they have the same triangles
+        // there.
+        let apart = if sign > 0.0 {
+            Corners::Positive
+        } else {
+            Corners::Negative
+        };
+        let collar = contour_cutting(
+            &self.grid.band,
+            &self.collar_field(g, sign),
+            OffBand::Outside,
+            apart,
+        );
+        let collar =
+            Volume::from_closed_mesh(&self.simplified(collar, g, sign)).expect("contours are manifold");
+        self.half(&wall.subtract(&collar), g, sign)
+            .unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
+    }
+
+    /// The parts of `apart` on the wanted side; `None` where a part lies on both sides.
+    fn half(&self, apart: &Volume, g: &[f32], sign: f32) -> Option<Volume> {
+        let cell = self.grid.band.cell_mm();
+        let leaks = Cell::new(false);
+        let half = apart.retain(|points| {
+            // Samples beside jumps of g may have the wrong sign, so the sum decides.
+            let (mut sum, mut n_points, mut n_beyond) = (0.0, 0, [0usize; 2]);
+            for h in points
+                .filter_map(|p| self.grid.band.sample(g, p))
+                .map(|g| f64::from(sign) * g)
+            {
+                sum += h;
+                n_points += 1;
+                n_beyond[0] += usize::from(h > cell);
+                n_beyond[1] += usize::from(h < -cell);
+            }
+            let n_stray = n_beyond[0].min(n_beyond[1]);
+            leaks.set(leaks.get() || n_stray > MOST_STRAY.max(n_points / 200));
+            sum > 0.0
+        });
+        (!leaks.get()).then_some(half)
+    }
+
+    /// The whole of the wanted side, less the gap.
+    fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
+        let field: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| (sign * g[n] - self.gap_mm[n]).min(self.limits(n)))
+            .collect();
+        // Corners are cut apart on the same side as in the other side's collar.
+        let apart = if sign > 0.0 {
+            Corners::Negative
+        } else {
+            Corners::Positive
+        };
+        let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
+        Volume::from_closed_mesh(&mesh).expect("contours are manifold")
+    }
+
+    /// Field that is positive where tools reach. Nothing is cut below the wall or far outside: cuts are
+    /// unknown there. Within a cell of the wall the limits exceed all values of the cut, because both sides'
+    /// collars must agree there; hence the steep slope.
+    fn limits(&self, n: usize) -> f32 {
+        let (depth, reach) = (self.grid.depth[n], LIMIT_CELLS * self.grid.band.cell_mm() as f32);
+        (self.grid.thickness_mm as f32 + reach - depth).min(depth + reach) * LIMIT_SLOPE
+    }
+
+    fn simplified(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
+        let h = |p: Vec3| self.grid.band.sample(g, p).map_or(0.0, |g| f64::from(sign) * g);
+        let tolerance: Vec<f64> = collar
+            .points
+            .par_iter()
+            .map(|&p| self.tolerance_mm(p, h(p)))
+            .collect();
+        decimate(collar, &tolerance)
+    }
+
+    /// Field that is positive in the collar: from the gap's border on the side of `sign` to some cells beyond
+    /// the cut.
+    fn collar_field(&self, g: &[f32], sign: f32) -> Vec<f32> {
+        let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
+        let is_own = |n: u32| sign * g[n as usize] > 0.0;
+        let mut field: Vec<f32> = (0..g.len() as u32)
+            .into_par_iter()
+            .map(|n| if is_own(n) { cutoff } else { -cell })
+            .collect();
+        let mut front: Vec<u32> = (0..g.len() as u32)
+            .into_par_iter()
+            .filter(|&n| is_own(n) && self.limits(n as usize) > 0.0)
+            .filter(|&n| {
+                self.grid
+                    .band
+                    .face_neighbours(n)
+                    .any(|m| !is_own(m) && self.limits(m as usize) > 0.0)
+            })
+            .collect();
+        for _ in 0..COLLAR_CELLS {
+            let beyond: Vec<u32> = front
+                .iter()
+                .flat_map(|&n| self.grid.band.face_neighbours(n))
+                .collect();
+            front.clear();
+            for n in beyond {
+                if field[n as usize] < 0.0 {
+                    field[n as usize] = cutoff;
+                    front.push(n);
+                }
+            }
+        }
+        field.par_iter_mut().enumerate().for_each(|(n, f)| {
+            *f = f.min(self.gap_mm[n] - sign * g[n]).min(self.limits(n));
+        });
+        field
+    }
+
+    /// Tolerance by which a collar may be simplified at `p`, mm, where `sign · g` is `h`: a small share of
+    /// the gap where it cuts, larger where it meets no remaining material.
+    fn tolerance_mm(&self, p: Vec3, h: f64) -> f64 {
+        let cell = self.grid.band.cell_mm();
+        let (params, reach) = (self.params, TIGHT_CELLS * cell);
+        let depth = self
+            .grid
+            .band
+            .sample(&self.grid.depth, p)
+            .unwrap_or(f64::NEG_INFINITY);
+        if h < -0.4 * cell || depth < -reach || depth > params.thickness_mm + reach {
+            return FREE_TOLERANCE_MM;
+        }
+        (GAP_SHARE * params.seam_gap_mm).min(CUT_TOLERANCE_MM)
+    }
+}
+
+/// Distance by which each side of a cut stays back at node `n`, mm. The key's seams can have a gap of their
+/// own.
+fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
+    let is_at_key = key_side.is_some_and(|key| key[n].abs() < KEY_REACH_MM);
+    let own = params.key_gap_mm.filter(|_| is_at_key);
+    own.unwrap_or(params.seam_gap_mm) as f32
+}
+
+/// State between two removals of pieces.
+struct Separation<'a> {
+    grid: &'a ShellGrid,
+    fragments: Fragments<'a>,
+    distances: &'a PatchDistances,
+    sweeper: Sweeper<'a>,
+    remains: Vec<bool>,
+    /// Field that is positive in the material that has not left, regardless of the wall's own limits.
+    rest: Vec<f32>,
+    /// Field that is positive where a later piece lies or passes on its way out.
+    in_later_ways: Vec<f32>,
+}
+
+impl<'a> Separation<'a> {
+    fn new(grid: &'a ShellGrid, distances: &'a PatchDistances, n_pieces: usize) -> Self {
+        let cutoff = grid.cutoff_mm();
+        Self {
+            grid,
+            fragments: Fragments::new(grid),
+            distances,
+            sweeper: Sweeper::new(&grid.band),
+            remains: vec![true; n_pieces],
+            rest: vec![cutoff; grid.band.len()],
+            in_later_ways: vec![-cutoff; grid.band.len()],
+        }
+    }
+
+    fn n_left(&self) -> usize {
+        self.remains.iter().filter(|r| **r).count()
+    }
+
+    /// Wall thickness field at a node, positive inside, extended outwards by `beyond_mm`.
+    fn wall(&self, node: usize, beyond_mm: f32) -> f32 {
+        let depth = self.grid.depth[node];
+        (depth + beyond_mm).min(self.grid.thickness_mm as f32 - depth)
+    }
+
+    /// Field `g_p` of the cut: positive on the side of p.
+    fn cut(&self, p: PatchId, separation: LatticeDirection) -> Vec<f32> {
+        let cutoff = self.grid.cutoff_mm();
+        let cell = self.grid.band.cell_mm() as f32;
+        let (skin_mm, margin) = (SKIN_CELLS as f32 * cell, MARGIN_CELLS as f32 * cell);
+        let along = separation.step();
+        let mut phi = self.distances.side_of(self.grid, p, &self.remains, separation);
+        // The remaining material is swept with a margin.
+        phi.par_iter_mut()
+            .for_each(|phi| *phi = (*phi + margin).min(cutoff));
+        let at = |node: usize, side: f32| self.wall(node, cell).min(side).min(self.rest[node]);
+        let skin: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| at(n, phi[n]).min(skin_mm - self.grid.depth[n]).max(-cutoff))
+            .collect();
+        let ahead_of_skin = self.sweeper.max_ahead(&skin, along.map(|x| -x));
+        let staying: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| (at(n, -phi[n]).min(-ahead_of_skin[n]) + margin).max(-cutoff))
+            .collect();
+        let behind_staying = self.sweeper.max_ahead(&staying, along);
+        let mut g: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
+            .collect();
+        // Fragments that p gives stay, so p must keep out of their way as well. Fragments that p gets leave
+        // together with all that is ahead of them.
+        for _ in 0..MOST_GIVINGS {
+            let Some(given) = self.fragments.give(&mut g, &self.rest) else {
+                break;
+            };
+            if let Some(mut gained) = given.gained(self.grid) {
+                gained
+                    .par_iter_mut()
+                    .enumerate()
+                    .for_each(|(n, f)| *f = at(n, *f).max(-cutoff));
+                let ahead = self.sweeper.max_ahead(&gained, along.map(|x| -x));
+                g.par_iter_mut()
+                    .zip(&ahead)
+                    .for_each(|(g, ahead)| *g = g.max(*ahead));
+            }
+            let staying: Vec<f32> = (0..g.len())
+                .into_par_iter()
+                .map(|n| at(n, -g[n]).max(-cutoff))
+                .collect();
+            let behind = self.sweeper.max_ahead(&staying, along);
+            g.par_iter_mut()
+                .zip(&behind)
+                .for_each(|(g, behind)| *g = g.min(-behind));
+        }
+        g
+    }
+
+    /// Share of the wall under the patch of `p` that is on p's side of the cut `g`, in [0, 1].
+    fn kept_share(&self, p: PatchId, g: &[f32]) -> f64 {
+        let phi = self.distances.preference(p, &self.remains, self.grid.cutoff_mm());
+        let is_own = |&n: &usize| phi[n] > 0.0 && self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0;
+        let (own, kept) = (0..g.len())
+            .into_par_iter()
+            .filter(is_own)
+            .map(|n| (1usize, usize::from(g[n] > 0.0)))
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        kept as f64 / own.max(1) as f64
+    }
+
+    /// Removes p. Returns the field that is positive where p may have no connectors.
+    fn remove(&mut self, p: PatchId, separation: LatticeDirection, g: &[f32]) -> Vec<f32> {
+        let cutoff = self.grid.cutoff_mm();
+        let along = separation.step();
+        let body: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| self.wall(n, 0.0).min(g[n]).min(self.rest[n]).max(-cutoff))
+            .collect();
+        self.remains[usize::from(p)] = false;
+        self.rest.par_iter_mut().zip(g).for_each(|(r, g)| *r = r.min(-g));
+        let staying: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| self.wall(n, 0.0).min(self.rest[n]).max(-cutoff))
+            .collect();
+        let (behind_staying, ahead_of_p) = rayon::join(
+            || self.sweeper.max_ahead(&staying, along),
+            || self.sweeper.max_ahead(&body, along.map(|x| -x)),
+        );
+        let in_way = behind_staying
+            .iter()
+            .zip(&self.in_later_ways)
+            .map(|(a, b)| a.max(*b))
+            .collect();
+        self.in_later_ways
+            .par_iter_mut()
+            .zip(&ahead_of_p)
+            .for_each(|(w, a)| *w = w.max(*a));
+        in_way
+    }
+}
+
+/// The inner surface of the wall while its owners are being found.
+struct InnerSurface {
+    mesh: TriMesh,
+    owner: Vec<Option<PatchId>>,
+}
+
+impl InnerSurface {
+    fn new(grid: &ShellGrid) -> Self {
+        let field: Vec<f32> = grid.depth.iter().map(|d| d - grid.thickness_mm as f32).collect();
+        let mesh = contour(&grid.band, &field, OffBand::LikeNeighbours);
+        let owner = vec![None; mesh.triangles.len()];
+        Self { mesh, owner }
+    }
+
+    /// Gives `p` the unowned part of the surface on its side of the cut `g`.
+    fn give(&mut self, p: PatchId, g: &[f32], band: &Band) {
+        let mut is_open = vec![false; self.mesh.points.len()];
+        for (triangle, _) in self
+            .mesh
+            .triangles
+            .iter()
+            .zip(&self.owner)
+            .filter(|(_, owner)| owner.is_none())
+        {
+            triangle.iter().for_each(|&v| is_open[v as usize] = true);
+        }
+        let value = |(&x, open): (&Vec3, &bool)| {
+            if *open {
+                band.sample(g, x).unwrap_or(-1.0)
+            } else {
+                -1.0
+            }
+        };
+        let values: Vec<f64> = self.mesh.points.par_iter().zip(&is_open).map(value).collect();
+        let cut = cut_at_zero(&self.mesh, &values, |face| self.owner[face].is_none());
+        self.owner = cut
+            .source_face
+            .iter()
+            .zip(&cut.side)
+            .map(|(&source, side)| match side {
+                Side::Positive => Some(p),
+                Side::Negative => None,
+                Side::Bystander => self.owner[source as usize],
+            })
+            .collect();
+        self.mesh = cut.mesh;
+    }
+
+    fn give_rest(&mut self, p: PatchId) {
+        self.owner.iter_mut().for_each(|o| *o = o.or(Some(p)));
+    }
+
+    fn finish(self, n_patches: usize) -> Option<SegmentedSurface> {
+        let n = self.mesh.triangles.len();
+        (n > 0).then(|| SegmentedSurface {
+            mesh: self.mesh,
+            patch_of_face: self
+                .owner
+                .into_iter()
+                .map(|o| o.expect("the last piece took the rest"))
+                .collect(),
+            source_face: (0..n as u32).collect(),
+            n_patches,
+        })
+    }
+}

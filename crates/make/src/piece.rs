@@ -1,0 +1,28 @@
+//! Finished pieces: bodies with their connectors, carved so that every path stays free, ready to print.
+//!
+//! Pieces are carved in the disassembly sequence. A piece's half connectors lose the parts that block its own
+//! way out, and the parts that a later piece, with its bodies and connectors, passes on its way out: the
+//! socket is the swept volume of the pin. Where a joined piece still comes too near to another, that is cut
+//! off too. Last, its number is engraved into the inner side of its wall.
+
+mod carve;
+mod finish;
+mod key_parts;
+mod label;
+mod relief;
+mod ribs;
+mod thin;
+
+pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
+pub use key_parts::Grip;
+pub use label::LabelParams;
+pub use relief::Relief;
+pub use shellock_assembly::{PressFit, PressFitKind};
+use shellock_geom::Volume;
+
+use crate::connector::{ConnectorParams, Run};
+
+/// The male and the female half of a run, before carving.
+pub(crate) fn whole_halves(params: &ConnectorParams, run: &Run) -> [Volume; 2] {
+    [carve::Half::Male, carve::Half::Female].map(|half| carve::whole_half(params, run, half))
+}

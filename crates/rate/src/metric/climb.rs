@@ -1,0 +1,342 @@
+//! Climb to the strongest plan: raises the least load factor under the conditions of the search (Sect. 6.2).
+//!
+//! Plans of the pool are rated goal by goal, worst first, and rejected at the first use with a lower load
+//! factor than that of the best so far. From the best plans the climb moves one piece at a time, along
+//! another direction or to another place in the order. The station that decides a goal lies between two
+//! pieces, so moves of these and of their neighbours are tried. A move is kept if it raises the load factor
+//! of the worst use. If none does, moves for the next use are tried, without loss in those before (leximin).
+//! The climb then continues for the pull on all seams, without loss in any use, and for falls, without loss
+//! in both.
+//!
+//! Batches are of fixed size, no clock is read and ties go to the first, so the result does not depend on
+//! threads.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+use shellock_assembly::{Cancelled, Ctx, PatchId};
+use shellock_geom::sparse::SparseError;
+use shellock_plan::{LatticePlan, Neighbourhood, RankedPlan};
+
+use super::rating::{Bench, Rank, Rated};
+
+/// Number of moves tried in parallel before the best of them is taken.
+const BATCH: usize = 8;
+/// Ratios of load factors from which on one counts as more, and as no less.
+const MORE: f64 = 1.01;
+const NO_LESS: f64 = 0.99;
+/// Share of the best value reached of a goal that must be kept for the sake of less important goals.
+const LEAST_OF_PEAK: f64 = 0.97;
+
+/// Limits of a climb's effort.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClimbParams {
+    /// Greatest number of loads that may be solved.
+    pub n_solves: usize,
+    /// Number of plans from which the climb starts.
+    pub n_starts: usize,
+}
+
+impl Default for ClimbParams {
+    fn default() -> Self {
+        Self {
+            n_solves: 4000,
+            n_starts: 4,
+        }
+    }
+}
+
+impl ClimbParams {
+    /// Number of loads that may be solved until the goals of a rank, and those before, are climbed.
+    fn until(&self, rank: Rank) -> usize {
+        let tenths = match rank {
+            Rank::Use => 6,
+            Rank::Pull => 9,
+            Rank::Fall | Rank::Hang => 10,
+        };
+        self.n_solves * tenths / 10
+    }
+}
+
+/// Result of a climb.
+pub struct Climbed<'a> {
+    /// The strongest plan found.
+    pub best: Rated<'a>,
+    /// Number of plans that were rated.
+    pub n_plans: usize,
+    /// Number of loads that were solved.
+    pub n_solves: usize,
+}
+
+/// Reason why a climb ended without a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ClimbError {
+    /// There was no plan to start from.
+    #[error("there is no plan to begin with")]
+    NoPlan,
+    /// The equations of a plan could not be solved.
+    #[error(transparent)]
+    Solve(#[from] SparseError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Climbs from `starts`, which keep all conditions. `may_be` must accept a plan before it is taken.
+pub fn climb<'b>(
+    ctx: &Ctx<'_>,
+    params: ClimbParams,
+    bench: &'b Bench<'b>,
+    around: &Neighbourhood<'_>,
+    starts: &[RankedPlan],
+    may_be: &(dyn Fn(&RankedPlan) -> bool + Sync),
+) -> Result<Climbed<'b>, ClimbError> {
+    let mut climber = Climber {
+        ctx,
+        bench,
+        around,
+        may_be,
+        n_plans: 0,
+        n_solves: 0,
+        floors: vec![0.0; bench.ranks.len()],
+    };
+    let starts = climber.best_starts(starts, params.n_starts)?;
+    let (n, until) = (starts.len(), params.until(Rank::Use));
+    let mut best: Option<Rated<'b>> = None;
+    for (i, start) in starts.into_iter().enumerate() {
+        // Each start gets its share of the remaining solves.
+        let left = until.saturating_sub(climber.n_solves);
+        let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
+        if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
+            best = Some(top);
+        }
+    }
+    let mut best = best.ok_or(ClimbError::NoPlan)?;
+    for rank in [Rank::Pull, Rank::Fall] {
+        best = climber.ascend(best, rank, params.until(rank))?;
+    }
+    climber.complete(&mut best, Rank::Hang)?;
+    Ok(Climbed {
+        best,
+        n_plans: climber.n_plans,
+        n_solves: climber.n_solves,
+    })
+}
+
+/// Returns true if `a` is stronger than `b`: in the first goal of that rank, from the worst on, in which they
+/// differ. If they differ in no use, the pull decides.
+fn is_above(a: &Rated<'_>, b: &Rated<'_>, rank: Rank) -> bool {
+    let factors = |r: &Rated<'_>, rank| -> Vec<f64> { r.factors(rank) };
+    let pairs = factors(a, rank).into_iter().zip(factors(b, rank));
+    for (x, y) in pairs {
+        if x > MORE * y || y > MORE * x {
+            return x > y;
+        }
+    }
+    rank == Rank::Use && is_above(a, b, Rank::Pull)
+}
+
+struct Climber<'c, 'b> {
+    ctx: &'c Ctx<'c>,
+    bench: &'b Bench<'b>,
+    around: &'c Neighbourhood<'c>,
+    may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
+    n_plans: usize,
+    n_solves: usize,
+    /// Least load factor to keep of each goal of the ranks that were climbed.
+    floors: Vec<f64>,
+}
+
+impl<'b> Climber<'_, 'b> {
+    /// The starts with the greatest load factors of their worst uses, best first.
+    fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
+        let allowed: Vec<RankedPlan> = (starts.par_iter())
+            .filter_map(|start| self.around.ranked(start.plan.clone()))
+            .collect();
+        let Some((first, others)) = allowed.split_first() else {
+            return Err(ClimbError::NoPlan);
+        };
+        let mut first = self.bench.begun(first.clone(), None)?;
+        self.complete(&mut first, Rank::Use)?;
+        self.complete(&mut first, Rank::Pull)?;
+        let mut best = vec![first];
+        for batch in others.chunks(BATCH) {
+            self.ctx.check()?;
+            // The least load factor of the last start kept is the bar for further starts.
+            let floor = if best.len() < n {
+                0.0
+            } else {
+                best[best.len() - 1].least()
+            };
+            let mut asked: Vec<(usize, f64)> = self
+                .bench
+                .goals(Rank::Use)
+                .into_iter()
+                .map(|g| (g, floor))
+                .collect();
+            asked.sort_by(|a, b| best[0].factor(a.0).total_cmp(&best[0].factor(b.0)));
+            asked.extend(self.bench.goals(Rank::Pull).into_iter().map(|g| (g, 0.0)));
+            best.extend(self.tried(batch, &best[0].clone(), &asked)?);
+            best.sort_by(|a, b| b.least().total_cmp(&a.least()));
+            best.truncate(n);
+        }
+        Ok(best)
+    }
+
+    /// Solves all goals of a rank.
+    fn complete(&mut self, plan: &mut Rated<'b>, rank: Rank) -> Result<(), ClimbError> {
+        for goal in self.bench.goals(rank) {
+            self.n_solves += usize::from(plan.ask(goal, None)?);
+        }
+        Ok(())
+    }
+
+    /// Returns those of `plans` that meet the goals as `asked`. The others are rejected at the first goal
+    /// that they do not meet. `like` is a similar plan, whose solutions are the starting points.
+    fn tried(
+        &mut self,
+        plans: &[RankedPlan],
+        like: &Rated<'b>,
+        asked: &[(usize, f64)],
+    ) -> Result<Vec<Rated<'b>>, ClimbError> {
+        let one = |ranked: &RankedPlan| -> Result<(Option<Rated<'b>>, usize), SparseError> {
+            let mut rated = self.bench.begun(ranked.clone(), Some(like))?;
+            for (i, &(goal, least)) in asked.iter().enumerate() {
+                rated.ask(goal, Some(like))?;
+                if rated.factor(goal) < least {
+                    return Ok((None, i + 1));
+                }
+            }
+            Ok((Some(rated), asked.len()))
+        };
+        let all: Vec<_> = plans.par_iter().map(one).collect::<Result<_, _>>()?;
+        self.n_plans += all.len();
+        self.n_solves += all.iter().map(|t| t.1).sum::<usize>();
+        Ok(all.into_iter().filter_map(|t| t.0).collect())
+    }
+
+    /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. The load
+    /// factors reached become floors for the ranks that follow.
+    fn ascend(&mut self, start: Rated<'b>, rank: Rank, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
+        let mut at = start;
+        self.complete(&mut at, rank)?;
+        let mut peak = at.least_of(rank);
+        let mut place = 0;
+        while self.n_solves < most_solves {
+            let order = at.worst_first(rank);
+            if place >= order.len() {
+                break;
+            }
+            match self.step(&at, rank, &order[..], place, LEAST_OF_PEAK * peak, most_solves)? {
+                Some(higher) => (at, place) = (higher, 0),
+                None => place += 1,
+            }
+            peak = peak.max(at.least_of(rank));
+        }
+        for goal in self.bench.goals(rank) {
+            self.floors[goal] = LEAST_OF_PEAK * at.factor(goal).min(rank.enough());
+        }
+        Ok(at)
+    }
+
+    /// Goals and least load factors of a move that improves the goal at `place` of `order`. That goal comes
+    /// first, as most moves do not improve it.
+    fn asked(
+        &self,
+        at: &Rated<'b>,
+        rank: Rank,
+        order: &[usize],
+        place: usize,
+        floor: f64,
+    ) -> Vec<(usize, f64)> {
+        let more = (MORE * at.factor(order[place])).min(rank.enough());
+        let mut asked = vec![(order[place], more)];
+        let before = order[..place]
+            .iter()
+            .map(|g| (*g, (NO_LESS * at.factor(*g)).max(floor)));
+        asked.extend(before);
+        let others = self
+            .bench
+            .goals(rank)
+            .into_iter()
+            .filter(|g| !order[..=place].contains(g));
+        asked.extend(others.map(|g| (g, more)));
+        let higher = (0..self.floors.len()).filter(|g| self.bench.ranks[*g] < rank);
+        asked.extend(higher.map(|g| (g, self.floors[g])));
+        asked
+    }
+
+    /// A move that improves the goal at `place` of `order`, without loss in those before; `None` if there is
+    /// none.
+    fn step(
+        &mut self,
+        at: &Rated<'b>,
+        rank: Rank,
+        order: &[usize],
+        place: usize,
+        floor: f64,
+        most_solves: usize,
+    ) -> Result<Option<Rated<'b>>, ClimbError> {
+        let asked = self.asked(at, rank, order, place, floor);
+        let mut seen = BTreeSet::from([self.around.name(&at.ranked.plan)]);
+        for pieces in self.movers(at, order[place]) {
+            let mut moves = Vec::new();
+            for piece in pieces {
+                moves.extend(self.around.moves(&at.ranked.plan, piece, &mut seen));
+            }
+            for batch in self.allowed(moves).chunks(BATCH) {
+                self.ctx.check()?;
+                let met = self.tried(batch, at, &asked)?;
+                let best = self.highest(met, rank);
+                if best.is_some() || self.n_solves >= most_solves {
+                    return Ok(best);
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The strongest of the plans that `may_be` accepts; the first of equals.
+    fn highest(&self, mut plans: Vec<Rated<'b>>, rank: Rank) -> Option<Rated<'b>> {
+        while !plans.is_empty() {
+            let best = (1..plans.len()).fold(0, |best, i| {
+                if is_above(&plans[i], &plans[best], rank) {
+                    i
+                } else {
+                    best
+                }
+            });
+            let plan = plans.remove(best);
+            if (self.may_be)(&plan.ranked) {
+                return Some(plan);
+            }
+        }
+        None
+    }
+
+    /// The pieces whose moves may improve a goal: the two at its decisive station, then their neighbours.
+    fn movers(&self, at: &Rated<'b>, goal: usize) -> Vec<Vec<PatchId>> {
+        let Some(station) = at.station(goal) else {
+            return Vec::new();
+        };
+        let two = self.bench.model.pieces_at(station as usize);
+        let mut near: Vec<PatchId> = (0..self.bench.model.assembly.stations.len())
+            .map(|i| self.bench.model.pieces_at(i))
+            .filter(|pair| pair.iter().any(|p| two.contains(p)))
+            .flatten()
+            .filter(|p| !two.contains(p))
+            .collect();
+        near.sort_unstable();
+        near.dedup();
+        vec![two.to_vec(), near]
+    }
+
+    /// The `moves` that keep all conditions, with their costs.
+    fn allowed(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
+        let ranked: Vec<Option<RankedPlan>> = moves
+            .into_par_iter()
+            .map(|plan| self.around.ranked(plan))
+            .collect();
+        ranked.into_iter().flatten().collect()
+    }
+}

@@ -1,9 +1,0 @@
-//! Seams: the borders of patches, the neighbours that they make, and the rules for connectors under them.
-
-mod frame;
-pub mod graph;
-mod line;
-pub mod rules;
-
-pub(crate) use frame::{FramedLine, later_is_male};
-pub(crate) use line::{seam_half_edges, stretches};
