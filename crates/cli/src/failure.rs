@@ -6,6 +6,7 @@ use shellock::design::DesignError;
 use shellock::stress_test::StressError;
 use shellock_formats::ReadError;
 use shellock_geom::check::InputError;
+use shellock_volume::compare::CompareError;
 
 /// Code of the warning or failure that says that the time ran out.
 pub const TIME_UP: &str = "time-up";
@@ -34,6 +35,8 @@ pub enum Failure {
     Design(#[from] DesignError),
     #[error(transparent)]
     Stress(#[from] StressError),
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     #[error("stopped; nothing was written")]
     Stopped,
     #[error("stopped; kits that are made stay, and the same command goes on from here")]
@@ -88,6 +91,7 @@ impl Failure {
             Self::Stopped
             | Self::BatchStopped
             | Self::Stress(StressError::Cancelled(_))
+            | Self::Compare(CompareError::Test(StressError::Cancelled(_)))
             | Self::Design(DesignError::Cancelled(_)) => 130,
             Self::NoPlan { .. } => 3,
             Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,

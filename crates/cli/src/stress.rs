@@ -8,13 +8,14 @@ use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
-    Outcome, PunchAt, StressParams, StressReport, StressVerdict, chart, compare, stress_test,
+    Outcome, PunchAt, StressParams, StressReport, StressVerdict, chart, stress_test,
 };
 use shellock::{Ctx, PatchId, SegmentedSurface};
 use shellock_geom::check::into_solid;
 use shellock_geom::{Solid, Vec3};
 use shellock_kit::{PlanFile, PlanFileError};
 use shellock_mechanics::Material;
+use shellock_volume::compare::compare;
 
 use crate::Session;
 use crate::args::{Axis, Blows, Place};
@@ -56,7 +57,8 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         .compare
         .then(|| compare(&ctx, &params, &surface, &order))
         .transpose()
-        .and_then(|compared| stress_test(&ctx, &params, &surface, &order, &pieces, compared))
+        .map_err(Failure::from)
+        .and_then(|compared| Ok(stress_test(&ctx, &params, &surface, &order, &pieces, compared)?))
         .inspect_err(|_| display.finish())?;
     display.finish();
 

@@ -120,7 +120,7 @@ pub struct Joint {
 
 /// Returns true if `opening_mm` pulls the pin of the meeting's connector out of its channel. NaN counts as
 /// lost.
-pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
+pub fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
     let lost_mm = meeting
         .joint
         .map_or(f64::INFINITY, |joint| PIN_DEPTH * joint.size_mm);
@@ -160,7 +160,7 @@ impl Opening {
 
     /// Returns [`Resistance::Separable`] if a station has lost its connector, and `Holds` otherwise. `parts`
     /// names the free parts of a station.
-    pub(crate) fn resistance<I: IntoIterator<Item = u32>>(
+    pub fn resistance<I: IntoIterator<Item = u32>>(
         self,
         meetings: &[Meeting],
         parts: impl Fn(usize) -> I,

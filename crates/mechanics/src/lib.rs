@@ -12,8 +12,8 @@ pub mod neighbourhood;
 pub mod sample;
 pub mod shell;
 pub mod solid;
+pub mod stress;
 pub mod surface;
-pub mod volume;
 
 pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
@@ -21,5 +21,5 @@ pub use shell::{
     Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support,
 };
 pub use solid::{SolidError, SolidModel, SolidParams};
+pub use stress::{StressLevel, StressSample};
 pub use surface::{Bearing, Closed, Drift, JoinedParts, SurfaceModel, SurfaceParams, SurfaceSolution};
-pub use volume::{Loaded, StressLevel, VolumeError, VolumeModel, VolumeParams};

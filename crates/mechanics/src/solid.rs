@@ -34,7 +34,7 @@ use shellock_geom::{Solid, Vec3};
 pub use touch::Touch;
 
 use crate::Material;
-use crate::volume::StressLevel;
+use crate::stress::StressLevel;
 use body::{Body, Place};
 use compliance::{Compliance, End, Seat};
 use element::Elements;

@@ -17,7 +17,7 @@
 //! Limits: static, without friction except at the key, without clearance. Places narrower than
 //! [`Handling::least_width_mm`] are not pressed.
 
-pub(crate) mod region;
+pub mod region;
 #[cfg(test)]
 mod tests;
 
@@ -29,7 +29,7 @@ use shellock_assembly::PatchId;
 use shellock_geom::boolean::Volume;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3};
-use shellock_mechanics::{Bearing, Loaded, Material, Meeting, Opening, ShellAssembly};
+use shellock_mechanics::{Bearing, Material, Meeting, Opening, ShellAssembly};
 
 use crate::impact::impact_n;
 
@@ -481,7 +481,7 @@ impl Borne {
 
     /// The lesser of this factor and that of a failure at a station. NaN means that there is no solution: the
     /// factor is then 0.
-    fn and(self, factor: f64, failure: Failure, station: u32) -> Self {
+    pub fn and(self, factor: f64, failure: Failure, station: u32) -> Self {
         let factor = if factor.is_nan() { 0.0 } else { factor };
         if factor < self.factor {
             Self {
@@ -494,7 +494,7 @@ impl Borne {
     }
 
     /// Adds the openings of all joints of `plan`.
-    fn opening(self, plan: &[Meeting], opening_mm: &[f64]) -> Self {
+    pub fn opening(self, plan: &[Meeting], opening_mm: &[f64]) -> Self {
         let joints = (0..).zip(plan.iter().zip(opening_mm));
         joints.fold(self, |least, (i, (meeting, mm))| match meeting.joint {
             Some(joint) => least.and(OPEN_SIZES * joint.size_mm / mm, Failure::Opens, i),
@@ -537,29 +537,4 @@ fn robust_pin(plan: &[Meeting], bearing: &Bearing) -> Option<(u32, f64)> {
         above_mm3 >= peak_mm3
     });
     robust.or(pins.last()).map(|pin| (pin.0, pin.1))
-}
-
-/// Load factor by the solid model, where walls can yield, too. The station at which walls or pins yield is
-/// not known, so the station that opens most is reported. Factor 0 where `loaded` is `None`: parts come
-/// apart.
-pub fn borne_by_solids(plan: &[Meeting], loaded: Option<&Loaded>, strength_mpa: f64) -> Borne {
-    let Some(loaded) = loaded else {
-        return Borne {
-            factor: 0.0,
-            first: None,
-        };
-    };
-    let opened = Borne::ANY.opening(plan, &loaded.opening_mm);
-    let station = opened.first.map_or(0, |f| f.1);
-    opened
-        .and(
-            strength_mpa / loaded.connectors.robust_mpa,
-            Failure::PinYields,
-            station,
-        )
-        .and(
-            strength_mpa / loaded.walls.robust_mpa,
-            Failure::WallYields,
-            station,
-        )
 }

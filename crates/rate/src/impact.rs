@@ -6,7 +6,7 @@ const GRAVITY_MM_S2: f64 = 9806.65;
 const IMPACT_S: f64 = 1.0 / 300.0;
 
 /// Force on a body of `mass_t` that has fallen by `drop_mm`, N: `m v / Δt` with `v = √(2 g h)`.
-pub(crate) fn impact_n(mass_t: f64, drop_mm: f64) -> f64 {
+pub fn impact_n(mass_t: f64, drop_mm: f64) -> f64 {
     mass_t * (2.0 * GRAVITY_MM_S2 * drop_mm).sqrt() / IMPACT_S
 }
 

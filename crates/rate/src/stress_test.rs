@@ -7,27 +7,24 @@
 //! its feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with `M v / Δt` on the points that
 //! touch it, and inertia balances the force.
 //!
-//! Worse designs have no finished pieces. [`compare`] makes walls and connectors of tetrahedra for them, as
-//! in the volume metric. For a fair comparison it does so for the kit's own plan, too: without gaps, without
-//! friction except at the key, with connectors wherever the plan has room.
+//! Worse designs have no finished pieces. The crate `shellock-volume` compares the kit's plan with them.
 //!
 //! Limits: static and linear; the fall is upright.
 
 mod chart;
-mod compare;
 mod printed;
 #[cfg(test)]
 mod tests;
 
 pub use chart::chart;
-pub use compare::compare;
 pub use printed::FRICTION;
+
 use serde::{Deserialize, Serialize};
 use shellock_assembly::{Cancelled, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::{Solid, Vec3};
 use shellock_mechanics::solid::{SolidError, SolidParams};
-use shellock_mechanics::{Meeting, ShellAssembly, VolumeError};
+use shellock_mechanics::{Meeting, ShellAssembly};
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{LatticePlan, PlanParams};
 use shellock_surface::{SegmentedSurface, Turn};
@@ -40,12 +37,12 @@ use crate::metric::{MetricParams, PlanModel};
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
 
 /// Opening up to which a seam with connectors of that size holds, mm.
-fn limit_mm(connector_mm: f64) -> f64 {
+pub fn limit_mm(connector_mm: f64) -> f64 {
     OPEN_SIZES * connector_mm
 }
 
 /// Size of the largest connectors, mm; 0 where there are none.
-fn largest_mm(meetings: &[Meeting]) -> f64 {
+pub fn largest_mm(meetings: &[Meeting]) -> f64 {
     meetings
         .iter()
         .filter_map(|m| m.joint)
@@ -54,7 +51,7 @@ fn largest_mm(meetings: &[Meeting]) -> f64 {
 }
 
 /// The point that the punch hits; `None` on an empty surface.
-fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
+pub fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
     let up = Vec3::from_array(params.plan.up).normalize_or(Vec3::Z);
     match params.punch_at {
         PunchAt::Top => {
@@ -66,7 +63,7 @@ fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
 }
 
 /// Returns true if any connector has opened too far.
-fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
+pub fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
     meetings
         .iter()
         .zip(opening_mm)
@@ -309,9 +306,6 @@ pub enum StressError {
     /// A way out is none of the 26 directions, once the model is rotated.
     #[error("piece {0} leaves along a direction that no plan of this program has")]
     Direction(PatchId),
-    /// The simulation of walls and connectors failed.
-    #[error("the simulation failed: {0}")]
-    Volume(#[from] VolumeError),
     /// The surface metric failed.
     #[error("the surface metric failed: {0}")]
     Surface(#[from] SparseError),
@@ -320,17 +314,40 @@ pub enum StressError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Parameters with the up direction of the rotated model.
-fn turned(params: &StressParams) -> StressParams {
-    let mut turned = params.clone();
-    turned.plan.up = params.turn.apply(Vec3::from(params.plan.up)).to_array();
-    turned
+/// Subject of a stress test, rotated so that all ways out are lattice directions.
+pub struct TestSubject {
+    /// Parameters with the up direction of the rotated model.
+    pub params: StressParams,
+    /// Surface of the rotated model.
+    pub surface: SegmentedSurface,
+    /// Plan with the directions of the rotated model.
+    pub plan: LatticePlan,
 }
 
-fn turned_surface(params: &StressParams, surface: &SegmentedSurface) -> SegmentedSurface {
-    SegmentedSurface {
-        mesh: params.turn.mesh(&surface.mesh),
-        ..surface.clone()
+impl TestSubject {
+    /// Rotates `surface` and `plan` by the turn of `params`.
+    ///
+    /// # Errors
+    /// Some parameters are out of range, the plan belongs to another surface, or a way out is no lattice
+    /// direction.
+    pub fn new(
+        params: &StressParams,
+        surface: &SegmentedSurface,
+        plan: &InstallationPlan,
+    ) -> Result<Self, StressError> {
+        check(params, surface, plan)?;
+        let plan = laid(params, plan)?;
+        let mut params = params.clone();
+        params.plan.up = params.turn.apply(Vec3::from(params.plan.up)).to_array();
+        let mesh = params.turn.mesh(&surface.mesh);
+        Ok(Self {
+            surface: SegmentedSurface {
+                mesh,
+                ..surface.clone()
+            },
+            params,
+            plan,
+        })
     }
 }
 
@@ -359,7 +376,7 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
 /// Tests the finished `pieces`, one for each patch of `surface`, in their assembled places; `plan` joins
 /// them. Takes 10 to 60 s for kits of 10 pieces.
 ///
-/// `compared` is the result of [`compare`], for the report.
+/// `compared` is the comparison with worse designs, for the report; see the crate `shellock-volume`.
 pub fn stress_test(
     ctx: &Ctx<'_>,
     params: &StressParams,
@@ -368,7 +385,11 @@ pub fn stress_test(
     pieces: &[Solid],
     compared: Option<Comparison>,
 ) -> Result<StressReport, StressError> {
-    check(params, surface, plan)?;
+    let TestSubject {
+        params,
+        surface,
+        plan,
+    } = &TestSubject::new(params, surface, plan)?;
     if pieces.len() != surface.n_patches {
         return Err(StressError::Pieces {
             pieces: pieces.len(),
@@ -380,11 +401,6 @@ pub fn stress_test(
         .iter()
         .map(|piece| turn.solid(piece).map_err(|_| StressError::NotClosed))
         .collect::<Result<_, _>>()?;
-    let (params, surface, plan) = (
-        &turned(params),
-        &turned_surface(params, surface),
-        &laid(params, plan)?,
-    );
     ctx.stage("finished pieces", 0)?;
     let model = PlanModel::new(&params.metric, surface, &params.sizes);
     let meetings = model.meetings(plan);

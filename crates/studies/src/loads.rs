@@ -7,10 +7,10 @@ use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
-use shellock::handling::{
-    Borne, Deed, Failure as Way, Handling, LoadCase, borne, borne_by_solids, load_cases,
-};
-use shellock_mechanics::{Drift, Meeting, VolumeModel};
+use shellock::handling::{Borne, Deed, Failure as Way, Handling, LoadCase, borne, load_cases};
+use shellock_mechanics::{Drift, Meeting};
+use shellock_volume::VolumeModel;
+use shellock_volume::compare::{borne_by_solids, volume_model};
 
 use crate::failure::Failure;
 use crate::metrics::{Subject, SubjectOptions, subject};
@@ -148,7 +148,7 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
 
 fn by_solid(subject: &Subject, rows: &mut [Row]) -> Result<(), Failure> {
     let failed = |e| crate::metrics::failed("volume", &e);
-    let model = subject.model.volume_model().map_err(failed)?;
+    let model = volume_model(&subject.model).map_err(failed)?;
     let forces: Vec<_> = rows.iter().map(|r| r.case.forces_n.clone()).collect();
     let start = Instant::now();
     let strength_mpa = subject.model.params.material.strength_mpa;
@@ -176,7 +176,7 @@ fn factors(
     plan: &[Meeting],
     forces: &[Vec<shellock_geom::Vec3>],
     strength_mpa: f64,
-) -> Result<Vec<Borne>, shellock_mechanics::VolumeError> {
+) -> Result<Vec<Borne>, shellock_volume::VolumeError> {
     let all = model.under_loads(plan, forces)?;
     Ok(all
         .iter()

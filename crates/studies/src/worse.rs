@@ -8,8 +8,9 @@ use shellock::design::Settings;
 use shellock::handling::Handling;
 use shellock::metric::{Choice, ClimbParams, Foresight, MetricParams, choose};
 use shellock::plan::{PlanConstraints, PlanOutcome, search};
-use shellock::stress_test::{Comparison, Outcome, StressParams, StressVerdict, compare};
+use shellock::stress_test::{Comparison, Outcome, StressParams, StressVerdict};
 use shellock::{Ctx, InstallationPlan};
+use shellock_volume::compare::compare;
 
 use crate::failure::Failure;
 use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};

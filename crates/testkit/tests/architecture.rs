@@ -21,7 +21,7 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the lowest up, each with those that its library or program may depend on.
-const FLOORS: [(&str, &[&str]); 19] = [
+const FLOORS: [(&str, &[&str]); 20] = [
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
@@ -36,6 +36,10 @@ const FLOORS: [(&str, &[&str]); 19] = [
     (
         "rate",
         &["geom", "assembly", "mechanics", "render", "surface", "plan"],
+    ),
+    (
+        "volume",
+        &["geom", "assembly", "mechanics", "surface", "plan", "rate"],
     ),
     ("make", &["geom", "assembly", "mechanics", "surface", "plan"]),
     (
@@ -67,6 +71,7 @@ const FLOORS: [(&str, &[&str]); 19] = [
             "print",
             "kit",
             "studio",
+            "volume",
         ],
     ),
     ("testkit", &["geom"]),
@@ -271,6 +276,7 @@ fn library_crates_touch_no_file_clock_or_stdout() {
         "divide",
         "plan",
         "rate",
+        "volume",
         "make",
         "shellock",
         "print",

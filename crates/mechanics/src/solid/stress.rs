@@ -4,7 +4,7 @@ use shellock_geom::Vec3;
 
 use super::body::Body;
 use super::element::{Elements, N_NODES, N_VOXELS, SIDE, von_mises_mpa};
-use crate::volume::StressSample;
+use crate::stress::StressSample;
 
 /// Least share of material for a voxel to be sampled.
 const MOSTLY: f64 = 0.5;

@@ -65,6 +65,7 @@ pub fn highest_in_the_middle(assembly: &ShellAssembly, up: Vec3, radius_mm: f64)
     highest_of(assembly, up, near).or_else(|| highest(assembly, up))
 }
 
+/// The highest of `points` along `up`; the first of several, `None` if there are none.
 pub fn highest_of(assembly: &ShellAssembly, up: Vec3, points: impl Iterator<Item = usize>) -> Option<usize> {
     let height = |i: usize| assembly.points[i].dot(up);
     points.reduce(|best, i| if height(i) > height(best) { i } else { best })
@@ -148,7 +149,9 @@ pub fn at_rest(hull: &TriMesh, center: Vec3, up: Vec3) -> Option<Vec3> {
 /// Width of the model between two points of its surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Width {
+    /// The two points, by their numbers.
     pub ends: [usize; 2],
+    /// Distance between them, mm.
     pub width_mm: f64,
 }
 

@@ -6,10 +6,7 @@ use shellock_geom::remesh::{RemeshParams, Remeshed, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
-use shellock_mechanics::{
-    Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams, VolumeError, VolumeModel,
-    VolumeParams,
-};
+use shellock_mechanics::{Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams};
 use shellock_plan::interface::meeting;
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{LatticePlan, PlanParams};
@@ -314,19 +311,6 @@ impl PlanModel {
     /// Position of a station on the outer surface, mm.
     pub fn place_of(&self, station: usize) -> Vec3 {
         self.assembly.points[self.assembly.stations[station].points[0] as usize]
-    }
-
-    /// Solver of the volume metric.
-    pub fn volume_model(&self) -> Result<VolumeModel, VolumeError> {
-        let MetricParams {
-            wall_mm, material, ..
-        } = self.params;
-        let params = VolumeParams {
-            wall_mm,
-            material,
-            ..VolumeParams::default()
-        };
-        VolumeModel::new(&params, &self.assembly)
     }
 
     /// Solver of the surface metric.

@@ -3,7 +3,6 @@ use shellock_geom::{Aabb, Volume};
 use shellock_plan::LatticeStep;
 use shellock_test_surfaces::{label, sphere};
 
-use super::compare::Bench;
 use super::*;
 use crate::handling::region::{around, lowest, spread};
 
@@ -119,52 +118,6 @@ fn what_is_tested_is_what_is_printed() {
 }
 
 #[test]
-fn half_connectors_fare_worse_than_whole_ones_and_the_chart_says_so() {
-    let compared = compare(&Ctx::quiet(), &coarse(), &octants(), &as_it_lies(&outwards())).unwrap();
-    let (kit, half) = (&compared.kit, &compared.half_connectors);
-    for (whole, half) in [(&kit.punch, &half.punch), (&kit.drop, &half.drop)] {
-        assert!(half.opening_mm > whole.opening_mm, "{half:?} {whole:?}");
-        assert!(half.connector_mpa > whole.connector_mpa && half.verdict >= whole.verdict);
-    }
-    let printed = FRICTION.map(|friction| Printed {
-        friction,
-        punch: kit.punch.clone(),
-        drop: kit.drop.clone(),
-    });
-    let report = StressReport {
-        printed: printed.to_vec(),
-        compared: Some(compared.clone()),
-        mass_g: 1.0,
-        strength_mpa: 42.0,
-    };
-    let n_rows = FRICTION.len() + compared.designs().len();
-    let drawing = chart(&report);
-    assert_eq!(drawing.matches("<rect").count(), 1 + 4 * n_rows);
-    assert_eq!(drawing.matches("<line").count(), 4 * n_rows);
-    assert!(drawing.ends_with("</svg>\n"));
-}
-
-#[test]
-fn a_stronger_material_bears_what_a_weaker_one_does_not() {
-    // A touch so light opens nothing; the verdict depends on the material alone.
-    let with_strength = |strength_mpa: f64| {
-        let mut params = StressParams {
-            punch_n: 1.0,
-            ..coarse()
-        };
-        params.metric.material.strength_mpa = strength_mpa;
-        let model = PlanModel::new(&params.metric, &octants(), &params.sizes);
-        let bench = Bench::new(&params, &model).unwrap();
-        bench.test(&model.meetings(&outwards()), None).unwrap().punch
-    };
-    let measured = with_strength(42.0);
-    assert_eq!(measured.verdict, StressVerdict::Holds);
-    let mpa = measured.wall_mpa.max(measured.connector_mpa);
-    assert_eq!(with_strength(0.9 * mpa).verdict, StressVerdict::Yields);
-    assert_eq!(with_strength(1.1 * mpa).verdict, StressVerdict::Holds);
-}
-
-#[test]
 fn the_directions_of_a_turned_model_are_those_of_the_lattice_again() {
     let turn = Turn::laying(Vec3::new(0.48, 0.6, 0.64), Vec3::new(0.8, 0.0, -0.6)).0;
     let params = StressParams { turn, ..coarse() };
@@ -172,28 +125,8 @@ fn the_directions_of_a_turned_model_are_those_of_the_lattice_again() {
         let way = turn.inverse().apply(s.separation.unit());
         (s.piece, shellock_assembly::Direction::of(way).unwrap())
     });
-    let found = laid(&params, &InstallationPlan::new(ways)).unwrap();
-    assert_eq!(found.steps[1..], outwards().steps[1..]);
-    let up = turned(&params).plan.up;
+    let subject = TestSubject::new(&params, &octants(), &InstallationPlan::new(ways)).unwrap();
+    assert_eq!(subject.plan.steps[1..], outwards().steps[1..]);
+    let up = subject.params.plan.up;
     assert!(turn.inverse().apply(Vec3::from(up)).distance(Vec3::Z) < 1e-12);
-}
-
-#[test]
-fn what_does_not_belong_together_is_refused() {
-    let ctx = Ctx::quiet();
-    let mut plan = outwards();
-    plan.steps.pop();
-    let refused = compare(&ctx, &coarse(), &octants(), &as_it_lies(&plan));
-    assert_eq!(refused, Err(StressError::Plan { steps: 7, patches: 8 }));
-    let mut astray = as_it_lies(&outwards());
-    astray.steps[3].separation = shellock_assembly::Direction::of(Vec3::new(1.0, 0.2, 0.0)).unwrap();
-    let refused = compare(&ctx, &coarse(), &octants(), &astray);
-    assert_eq!(refused, Err(StressError::Direction(PatchId(3))));
-    let params = StressParams {
-        punch_n: f64::NAN,
-        drop_mm: -1.0,
-        cell_mm: 0.0,
-        ..coarse()
-    };
-    assert_eq!(params.problems().len(), 3);
 }

@@ -9,9 +9,8 @@ use shellock::metric::{data_driven, pieces_alone};
 use shellock::plan::local_tests::LocalTests;
 use shellock::plan::{PlanConstraints, PlanScore, score};
 use shellock_geom::sparse::SparseError;
-use shellock_mechanics::{
-    Opening, Resistance, SurfaceModel, SurfaceParams, SurfaceSolution, VolumeError, VolumeModel, VolumeParams,
-};
+use shellock_mechanics::{Opening, Resistance, SurfaceModel, SurfaceParams, SurfaceSolution};
+use shellock_volume::{VolumeError, VolumeModel, VolumeParams};
 
 use super::Subject;
 use crate::failure::Failure;

@@ -8,9 +8,10 @@ use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
-use shellock::stress_test::{StressParams, chart, compare, stress_test};
+use shellock::stress_test::{StressParams, chart, stress_test};
 use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Painted, render};
+use shellock_volume::compare::{CompareError, compare};
 
 use super::draw::{PALE, RED, color_bar, color_of, dots, plain, tube};
 use super::kit::Kit;
@@ -156,7 +157,8 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
         })?;
     let report = with_ctx(|ctx| {
         let compared = compare(ctx, &params, &made.surface, &made.plan)?;
-        stress_test(ctx, &params, &made.surface, &made.plan, &solids, Some(compared))
+        let compared = Some(compared);
+        stress_test(ctx, &params, &made.surface, &made.plan, &solids, compared).map_err(CompareError::Test)
     });
     let report = report.map_err(|e| Failure::Model {
         path: PathBuf::from("squirrel"),

@@ -13,6 +13,7 @@
 //! which touch at mid-wall; the channel's other faces hold in both directions.
 
 mod bars;
+pub mod compare;
 mod connector;
 mod contact;
 mod element;
@@ -27,23 +28,20 @@ mod tests;
 mod unknowns;
 mod wall;
 
-use rayon::prelude::*;
-use shellock_geom::Vec3;
-use shellock_geom::sparse::SparseError;
-
-pub use element::Order;
-pub use load::Loaded;
-pub use stress::{Sample as StressSample, StressLevel};
-pub use wall::{MIN_VOLUME_SHARE, Wall};
-
-use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
 use bars::{Sections, Spans};
 use connector::{Bar, Section};
 use contact::{Equilibrium, Response};
+pub use element::Order;
 use front::Front;
+pub use load::Loaded;
 use part::Part;
+use rayon::prelude::*;
 use rows::{ROWS, WALL};
+use shellock_geom::Vec3;
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
 use unknowns::Labels;
+pub use wall::{MIN_VOLUME_SHARE, Wall};
 
 /// Parameters of the model of walls and connectors.
 #[derive(Clone, Copy, Debug, PartialEq)]

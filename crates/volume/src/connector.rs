@@ -15,6 +15,8 @@
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
+use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
+use shellock_mechanics::{Joint, Side};
 
 use super::VolumeModel;
 use super::bars::{Sections, Spans};
@@ -22,8 +24,6 @@ use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
 use super::rows::ROWS;
 use super::unknowns::{Labels, Owner};
-use crate::connector::{PIN_DEPTH, PIN_WIDTH};
-use crate::{Joint, Side};
 
 /// Distance outside the wall at which corners still count as inside, as a share of D: points on the inner
 /// surface are inside.

@@ -1,8 +1,8 @@
 //! Benchmark of the volume metric on a ball of eight octants, 17 496 quadratic tetrahedra.
 
 use divan::{Bencher, black_box};
-use shellock_mechanics::volume::Order;
-use shellock_mechanics::{Joint, Meeting, Resistance, Side, VolumeModel, VolumeParams, sample};
+use shellock_mechanics::{Joint, Meeting, Resistance, Side, sample};
+use shellock_volume::{Order, VolumeModel, VolumeParams};
 
 fn main() {
     divan::main();

@@ -2,11 +2,11 @@
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::{SparseError, SparseSymmetric};
+use shellock_mechanics::Material;
 
 use super::element::{EDGES, Order, lame, stiffness};
 use super::front::Front;
 use super::wall::Wall;
-use crate::Material;
 
 /// Elastic wall of a part as seen by its connectors.
 #[derive(Debug)]

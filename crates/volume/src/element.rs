@@ -1,8 +1,7 @@
 //! Stiffness of straight-sided tetrahedra with 4 or 10 nodes.
 
 use shellock_geom::Vec3;
-
-use crate::Material;
+use shellock_mechanics::Material;
 
 /// End corners of the edge on which each node beyond the fourth lies.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];

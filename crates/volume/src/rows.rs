@@ -8,11 +8,11 @@
 //! | 6    | mid-wall         | wall  | pushes only                             |
 
 use shellock_geom::Vec3;
+use shellock_mechanics::{Meeting, Side};
 
 use super::VolumeModel;
 use super::front::Front;
 use super::unknowns::Labels;
-use crate::{Meeting, Side};
 
 /// Number of contact rows of a station.
 pub(super) const ROWS: usize = 7;
@@ -88,7 +88,7 @@ impl VolumeModel {
     pub(super) fn sides_of_part(&self, part: u32) -> impl Iterator<Item = (usize, Side)> {
         let of_station = move |(station, parts): (usize, &[u32; 2])| {
             let parts = *parts;
-            crate::SIDES
+            shellock_mechanics::SIDES
                 .into_iter()
                 .filter(move |side| parts[side.index()] == part)
                 .map(move |side| (station, side))

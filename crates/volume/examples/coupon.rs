@@ -18,7 +18,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use shellock_geom::Vec3;
-use shellock_mechanics::{Joint, Meeting, Side, VolumeModel, VolumeParams, sample};
+use shellock_mechanics::{Joint, Meeting, Side, sample};
+use shellock_volume::{VolumeModel, VolumeParams};
 
 const LENGTH: f64 = 40.0;
 const WIDTH: f64 = 20.0;

@@ -1,8 +1,9 @@
 //! Numbering of the unknowns of a part.
 
+use shellock_mechanics::{SIDES, Side};
+
 use super::connector::N_SECTION;
 use super::rows::ROWS;
-use crate::{SIDES, Side};
 
 /// Labels of a part's unknowns, in this order: wall, contact rows, load, nodes of the sections, nodes
 /// halfway.

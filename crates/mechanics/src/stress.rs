@@ -1,14 +1,10 @@
-//! Stresses in walls and connectors, and a robust measure of them.
+//! Stress levels of material, and a robust measure of them.
 //!
-//! Von Mises stress is sampled at the corners of the tetrahedra, where bending stress is largest, each with a
-//! quarter of the volume. At re-entrant corners and under point forces, elasticity has no largest stress: the
-//! finer the mesh, the higher the value. So the figure to compare with a material's strength is the one that
-//! all but [`PEAK_SHARE`] of the volume stay under.
+//! At re-entrant corners and under point forces, elasticity has no largest stress: the finer the mesh, the
+//! higher the value. So the figure to compare with a material's strength is the one that all but
+//! [`PEAK_SHARE`] of the volume stay under.
 
 use shellock_geom::Vec3;
-
-use super::element::{Order, lame, volume_6, von_mises_mpa};
-use crate::Material;
 
 /// Share of the volume whose stress counts as a peak: an artefact of the model, which a ductile print evens
 /// out.
@@ -27,7 +23,7 @@ pub struct StressLevel {
 
 /// Stress at one point, with the volume that the point represents.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct StressSample {
     /// Von Mises stress, MPa, ≥ 0.
     pub stress_mpa: f64,
     /// Volume that the sample represents, mm³.
@@ -36,29 +32,9 @@ pub struct Sample {
     pub at: Vec3,
 }
 
-/// Stress samples at the four corners of a tetrahedron.
-pub(super) fn samples(
-    order: Order,
-    corners: [Vec3; 4],
-    material: &Material,
-    displacement_mm: &[Vec3; 10],
-) -> [Sample; 4] {
-    let volume_mm3 = volume_6(corners).abs() / 24.0;
-    std::array::from_fn(|i| {
-        let mut l = [0.0; 4];
-        l[i] = 1.0;
-        let stress_mpa = von_mises_mpa(order, corners, lame(material), displacement_mm, l);
-        Sample {
-            stress_mpa,
-            volume_mm3,
-            at: corners[i],
-        }
-    })
-}
-
 impl StressLevel {
     /// Stress level of all samples; zero if there are none.
-    pub fn of(mut samples: Vec<Sample>) -> Self {
+    pub fn of(mut samples: Vec<StressSample>) -> Self {
         samples.sort_by(|a, b| b.stress_mpa.total_cmp(&a.stress_mpa));
         let Some(largest) = samples.first() else {
             return Self::default();

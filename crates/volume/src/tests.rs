@@ -1,6 +1,6 @@
+use shellock_mechanics::{Joint, sample};
+
 use super::*;
-use crate::Joint;
-use crate::sample;
 
 /// Connector size D: the middle of the paper's 2 to 4.
 const SIZE_MM: f64 = 3.0;
@@ -557,7 +557,7 @@ fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() 
     let bars = super::bars::bars(&model, &plan, &sections);
     assert!(bars.iter().any(|bar| bar.to.is_ok()) && bars.iter().any(|bar| bar.to.is_err()));
     for (i, meeting) in plan.iter().enumerate() {
-        for side in crate::SIDES {
+        for side in shellock_mechanics::SIDES {
             let n_bars = bars
                 .iter()
                 .filter(|bar| bar.side == side && bar.stations().any(|s| s == i))

@@ -1,20 +1,92 @@
 //! Stress tests of worse designs, which have no finished pieces: walls and connectors of tetrahedra with
-//! contact, made from surface and plan as in the volume metric, without gaps.
+//! contact, made from surface and plan.
+//!
+//! For a fair comparison the kit's own plan is tested so, too: without gaps, without friction except at the
+//! key, with connectors wherever the plan has room.
 
-use shellock_assembly::{Ctx, InstallationPlan};
+#[cfg(test)]
+mod tests;
+
+use shellock_assembly::{Cancelled, Ctx, InstallationPlan};
 use shellock_geom::Vec3;
-use shellock_mechanics::{Joint, Loaded, Meeting, StressLevel, VolumeError, VolumeModel, VolumeParams};
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{Joint, Meeting, StressLevel};
 use shellock_plan::{LatticePlan, random_plans, survey};
+use shellock_rate::handling::region::{around, lowest, spread};
+use shellock_rate::handling::{Borne, Failure, Handling};
+use shellock_rate::impact::impact_n;
+use shellock_rate::metric::{self, MetricParams, PlanModel};
+use shellock_rate::stress_test::{
+    Comparison, Outcome, PUNCH_RADIUS_MM, Pair, StressError, StressParams, StressVerdict, TestSubject, hit,
+    is_open, largest_mm, limit_mm,
+};
 use shellock_surface::SegmentedSurface;
 
-use super::{
-    Comparison, Outcome, PUNCH_RADIUS_MM, Pair, StressError, StressParams, StressVerdict, check, hit,
-    is_open, laid, largest_mm, limit_mm, turned, turned_surface,
-};
-use crate::handling::Handling;
-use crate::handling::region::{around, lowest, spread};
-use crate::impact::impact_n;
-use crate::metric::{self, MetricParams, PlanModel};
+use crate::{Loaded, VolumeError, VolumeModel, VolumeParams};
+
+/// Reasons why worse designs could not be tested.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    /// Parameters or plan are wrong, or the surface metric failed.
+    #[error(transparent)]
+    Test(#[from] StressError),
+    /// The simulation of walls and connectors failed.
+    #[error("the simulation failed: {0}")]
+    Volume(#[from] VolumeError),
+}
+
+impl From<SparseError> for CompareError {
+    fn from(error: SparseError) -> Self {
+        Self::Test(error.into())
+    }
+}
+
+impl From<Cancelled> for CompareError {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Test(cancelled.into())
+    }
+}
+
+/// Creates the solver of the volume metric for the surface of `model`.
+///
+/// # Errors
+/// No wall can be built on the surface.
+pub fn volume_model(model: &PlanModel) -> Result<VolumeModel, VolumeError> {
+    let MetricParams {
+        wall_mm, material, ..
+    } = model.params;
+    let params = VolumeParams {
+        wall_mm,
+        material,
+        ..VolumeParams::default()
+    };
+    VolumeModel::new(&params, &model.assembly)
+}
+
+/// Load factor by the solid model, where walls can yield, too. The station at which walls or pins yield is
+/// not known, so the station that opens most is reported. Factor 0 where `loaded` is `None`: parts come
+/// apart.
+pub fn borne_by_solids(plan: &[Meeting], loaded: Option<&Loaded>, strength_mpa: f64) -> Borne {
+    let Some(loaded) = loaded else {
+        return Borne {
+            factor: 0.0,
+            first: None,
+        };
+    };
+    let opened = Borne::ANY.opening(plan, &loaded.opening_mm);
+    let station = opened.first.map_or(0, |f| f.1);
+    opened
+        .and(
+            strength_mpa / loaded.connectors.robust_mpa,
+            Failure::PinYields,
+            station,
+        )
+        .and(
+            strength_mpa / loaded.walls.robust_mpa,
+            Failure::WallYields,
+            station,
+        )
+}
 
 /// Number of random plans among which one of half the score is looked for.
 const N_DRAWN: usize = 100;
@@ -38,13 +110,12 @@ pub fn compare(
     params: &StressParams,
     surface: &SegmentedSurface,
     plan: &InstallationPlan,
-) -> Result<Comparison, StressError> {
-    check(params, surface, plan)?;
-    let (params, surface, plan) = (
-        &turned(params),
-        &turned_surface(params, surface),
-        &laid(params, plan)?,
-    );
+) -> Result<Comparison, CompareError> {
+    let TestSubject {
+        params,
+        surface,
+        plan,
+    } = &TestSubject::new(params, surface, plan)?;
     ctx.stage("a plan of half the score", 0)?;
     let model = sound_model(ctx, params, surface)?;
     let handling = Handling::new(params.plan.up, params.metric.wall_mm, params.metric.material);
@@ -78,7 +149,7 @@ fn sound_model(
     ctx: &Ctx<'_>,
     params: &StressParams,
     surface: &SegmentedSurface,
-) -> Result<PlanModel, StressError> {
+) -> Result<PlanModel, CompareError> {
     let mut failure = None;
     for share in EDGE_SHARES {
         let model = PlanModel::new(
@@ -89,7 +160,7 @@ fn sound_model(
             surface,
             &params.sizes,
         );
-        match model.volume_model() {
+        match volume_model(&model) {
             Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
             Err(e) => return Err(e.into()),
             Ok(_) => {
@@ -112,7 +183,7 @@ fn half_as_good(
     surface: &SegmentedSurface,
     loads: &metric::Bench<'_>,
     score: f64,
-) -> Result<Option<(LatticePlan, f64)>, StressError> {
+) -> Result<Option<(LatticePlan, f64)>, CompareError> {
     let survey = survey(ctx, &params.plan, surface, &surface.seams(), &params.sizes)?;
     let mut best: Option<(f64, LatticePlan, f64)> = None;
     for plan in random_plans(&params.plan, &survey, N_DRAWN) {
@@ -127,7 +198,7 @@ fn half_as_good(
 }
 
 /// The pieces of one design, standing and falling.
-pub(super) struct Bench<'a> {
+struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
     /// Solver with the model held where it stands.

@@ -5,9 +5,9 @@
 //! the wall is made thinner.
 
 use shellock_geom::Vec3;
+use shellock_mechanics::ShellAssembly;
 
 use super::element::volume_6;
-use crate::ShellAssembly;
 
 /// Least volume of a tetrahedron, as a share of that in a straight prism on the same triangle.
 ///

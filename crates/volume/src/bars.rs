@@ -1,10 +1,10 @@
 //! Bars of a plan: which stations each of them joins.
 
 use shellock_geom::Vec3;
+use shellock_mechanics::{Meeting, SIDES};
 
 use super::VolumeModel;
 use super::connector::{Bar, Section, tets_between};
-use crate::{Meeting, SIDES};
 
 /// Cross-sections of both sides at each station; `None` where it is not joined.
 pub(super) type Sections = Vec<[Option<Section>; 2]>;

@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
+use shellock_mechanics::assembly::is_lost;
+use shellock_mechanics::{Meeting, StressLevel, StressSample};
 
 use super::bars::{self, Sections};
 use super::connector::{self, Bar};
@@ -22,11 +24,9 @@ use super::element::volume_6;
 use super::front::Front;
 use super::part::{Numbering, RigidModes, assemble};
 use super::rows::{self, ROWS, WALL};
-use super::stress::{Sample, StressLevel, samples};
+use super::stress::samples;
 use super::unknowns::Labels;
 use super::{VolumeError, VolumeModel, mechanism};
-use crate::Meeting;
-use crate::assembly::is_lost;
 
 /// Conversion from g/cm³ to t/mm³, so that t · mm/s² = N.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
@@ -143,7 +143,7 @@ impl VolumeModel {
         bodies.par_iter_mut().for_each(|body| body.move_by(&equilibrium));
         let opening_mm = self.openings(plan, &responses, &equilibrium, sections);
         let (triangle_mpa, walls) = self.wall_stress(bodies);
-        let connectors: Vec<Sample> = bodies
+        let connectors: Vec<StressSample> = bodies
             .par_iter()
             .flat_map_iter(|b| b.bar_samples(self, sections))
             .collect();
@@ -223,7 +223,7 @@ impl VolumeModel {
 
     /// Largest stress below each triangle, and the stress level of all walls.
     fn wall_stress(&self, bodies: &[Body]) -> (Vec<f64>, StressLevel) {
-        let samples: Vec<(u32, [Sample; 4])> = bodies
+        let samples: Vec<(u32, [StressSample; 4])> = bodies
             .par_iter()
             .flat_map_iter(|b| b.wall_samples(self))
             .collect();
@@ -512,7 +512,10 @@ impl<'a> Body<'a> {
         first.map_or(Vec3::ZERO, at)
     }
 
-    fn wall_samples<'b>(&'b self, model: &'b VolumeModel) -> impl Iterator<Item = (u32, [Sample; 4])> + 'b {
+    fn wall_samples<'b>(
+        &'b self,
+        model: &'b VolumeModel,
+    ) -> impl Iterator<Item = (u32, [StressSample; 4])> + 'b {
         let order = model.params.order;
         self.tets.iter().map(move |&tet| {
             let unknowns = self.numbering.of_tet(order, &model.wall.tets[tet as usize]);
@@ -529,7 +532,7 @@ impl<'a> Body<'a> {
         })
     }
 
-    fn bar_samples(&self, model: &VolumeModel, sections: &Sections) -> Vec<Sample> {
+    fn bar_samples(&self, model: &VolumeModel, sections: &Sections) -> Vec<StressSample> {
         let mut all = Vec::new();
         for bar in &self.bars {
             let Some((ends, movers)) = bar.movers(sections, self.labels) else {
