@@ -14,6 +14,7 @@
 mod agenda;
 mod attempt;
 mod candidate;
+mod cost;
 mod division;
 mod handover;
 mod kit;
@@ -70,8 +71,12 @@ pub fn design(
         model,
         labels,
     };
-    let mut trial = Trial::new(input, Wall::decide(ctx, &input)?);
     let mut agenda = Agenda::new(ctx, &input);
+    let Some(wall) = in_time(ctx, |part| Wall::decide(part, &input))? else {
+        agenda.end_late();
+        return Best::<Kit>::new().conclude(ctx, &input, &agenda, Effort::default());
+    };
+    let mut trial = Trial::new(input, wall);
     let best = explore(ctx, &mut agenda, &mut trial, attempt::make_kit, |kit: &Kit| {
         (kit.grade(), kit.failures())
     })?;
@@ -90,8 +95,8 @@ fn resolved(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Pa
     })
 }
 
-/// Tries what the agenda says until an end is good enough or nothing is left to try. Once there is an end,
-/// trials that are not done in time are given up.
+/// Tries what the agenda says until an end is good enough or nothing is left to try. Trials that are not done
+/// in time are given up.
 fn explore<'a, T>(
     ctx: &Ctx,
     agenda: &mut Agenda,
@@ -102,27 +107,19 @@ fn explore<'a, T>(
     let mut best = Best::new();
     let mut change = None;
     loop {
-        let part = if best.has_end() {
-            ctx.fork().ending_in_time()
-        } else {
-            ctx.fork()
-        };
-        let found = try_change(&part, agenda, trial, change, &attempt);
-        for warning in part.into_warnings() {
-            ctx.warn(warning);
-        }
+        let found = in_time(ctx, |part| try_change(part, agenda, trial, change, &attempt));
         let site = trial.site(agenda);
         let (mut changes, mut report) = (Vec::new(), Report::default());
         match found {
-            Err(DesignError::Cancelled(_)) => {
-                ctx.check()?;
+            Err(DesignError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Ok(None) => {
                 agenda.end_late();
                 return Ok(best);
             }
             Err(error) => best.close_key_with(ctx, site.as_ref(), error),
-            Ok(found) => {
+            Ok(Some(found)) => {
                 report.offers = found.changes.iter().map(Change::step).collect();
-                report.late = found.late;
+                (report.late, report.is_hurried) = (found.late, found.is_hurried);
                 changes = found.changes;
                 best.fail(found.failure);
                 if let Some(end) = found.end {
@@ -147,6 +144,25 @@ fn explore<'a, T>(
         }
         let offered = changes.into_iter().find(|change| change.step() == step);
         change = Some(offered.unwrap_or(Change::Step(step)));
+    }
+}
+
+/// Does a part of the job; `None` if it is not done when the time ends.
+fn in_time<T>(
+    ctx: &Ctx,
+    work: impl FnOnce(&Ctx<'_>) -> Result<T, DesignError>,
+) -> Result<Option<T>, DesignError> {
+    let part = ctx.fork().ending_in_time();
+    let done = work(&part);
+    for warning in part.into_warnings() {
+        ctx.warn(warning);
+    }
+    match done {
+        Err(DesignError::Cancelled(_)) => {
+            ctx.check()?;
+            Ok(None)
+        }
+        done => done.map(Some),
     }
 }
 
@@ -226,10 +242,14 @@ pub fn plan(
         model,
         labels,
     };
-    let mut trial = Trial::new(input, Wall::decide(ctx, &input)?);
     let mut agenda = Agenda::new(ctx, &input);
+    let Some(wall) = in_time(ctx, |part| Wall::decide(part, &input))? else {
+        agenda.end_late();
+        return Best::<Planned>::new().conclude(ctx, &agenda);
+    };
+    let mut trial = Trial::new(input, wall);
     let best = explore(ctx, &mut agenda, &mut trial, attempt::seek_plan, |_: &Planned| {
         (Grade::PERFECT, Vec::new())
     })?;
-    best.conclude(&agenda)
+    best.conclude(ctx, &agenda)
 }

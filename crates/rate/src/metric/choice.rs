@@ -207,6 +207,8 @@ pub struct Chosen {
     pub holding: Holding,
     /// Motion of the pieces under the loads that are reported.
     pub deformed: Deformed,
+    /// True if a stronger plan would have been sought if more time were left.
+    pub is_cut_short: bool,
 }
 
 /// Climbs from the plans of the pool to a stronger one that costs at most a quarter more than the least.
@@ -224,7 +226,12 @@ pub fn choose(
     let Choice { params, surface, .. } = *choice;
     let model = &foresight.model;
     let bench = Bench::new(choice.handling, model)?;
-    let (best, n_compared) = most_bearing(ctx, choice, foresight, &bench, &found)?;
+    let Climbed {
+        best,
+        n_plans: n_compared,
+        is_cut_short,
+        ..
+    } = most_bearing(ctx, choice, foresight, &bench, &found)?;
     let chosen = best.ranked.clone();
     let solved = bench.surface.resist(&best.meetings, chosen.plan.key().0)?;
     let Foreseen {
@@ -267,17 +274,18 @@ pub fn choose(
         found,
         holding,
         deformed,
+        is_cut_short,
     })
 }
 
-/// The strongest plan, and the number of plans compared.
+/// The strongest plan, and how it was found.
 fn most_bearing<'b>(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
     foresight: &Foresight,
     bench: &'b Bench<'_>,
     found: &FoundPlan,
-) -> Result<(Rated<'b>, usize), ChoiceError> {
+) -> Result<Climbed<'b>, ChoiceError> {
     let Some(first) = found.pool.first() else {
         return Err(ChoiceError::NoPlan);
     };
@@ -287,8 +295,13 @@ fn most_bearing<'b>(
     let may_be = |p: &RankedPlan| foresight.is_steady(&p.plan);
     let starts = foresight.steady();
     match climb(ctx, choice.climb, bench, &around, &starts, &may_be) {
-        Ok(Climbed { best, n_plans, .. }) => Ok((best, n_plans)),
-        Err(ClimbError::NoPlan) => Ok((bench.rated(first.clone())?, 1)),
+        Ok(climbed) => Ok(climbed),
+        Err(ClimbError::NoPlan) => Ok(Climbed {
+            best: bench.rated(first.clone())?,
+            n_plans: 1,
+            n_solves: 0,
+            is_cut_short: false,
+        }),
         Err(ClimbError::Solve(e)) => Err(e.into()),
         Err(ClimbError::Cancelled(e)) => Err(e.into()),
     }

@@ -8,8 +8,8 @@
 //! The climb then continues for the pull on all seams, without loss in any use, and for falls, without loss
 //! in both.
 //!
-//! Batches are of fixed size, no clock is read and ties go to the first, so the result does not depend on
-//! threads.
+//! Batches are of fixed size and ties go to the first, so the result does not depend on threads. It depends
+//! on time only where a limit of time ends the climb, which is reported.
 
 use std::collections::BTreeSet;
 
@@ -35,6 +35,9 @@ pub struct ClimbParams {
     pub n_solves: usize,
     /// Number of plans from which the climb starts.
     pub n_starts: usize,
+    /// Time to keep back for later work, s; ≥ 0. The climb ends when no more than that is left of a limited
+    /// time.
+    pub reserve_s: f64,
 }
 
 impl Default for ClimbParams {
@@ -42,6 +45,7 @@ impl Default for ClimbParams {
         Self {
             n_solves: 4000,
             n_starts: 4,
+            reserve_s: 0.0,
         }
     }
 }
@@ -66,6 +70,8 @@ pub struct Climbed<'a> {
     pub n_plans: usize,
     /// Number of loads that were solved.
     pub n_solves: usize,
+    /// True if the time ended the climb.
+    pub is_cut_short: bool,
 }
 
 /// Reason why a climb ended without a plan.
@@ -98,6 +104,8 @@ pub fn climb<'b>(
         may_be,
         n_plans: 0,
         n_solves: 0,
+        reserve_s: params.reserve_s,
+        is_cut_short: false,
         floors: vec![0.0; bench.ranks.len()],
     };
     let starts = climber.best_starts(starts, params.n_starts)?;
@@ -120,6 +128,7 @@ pub fn climb<'b>(
         best,
         n_plans: climber.n_plans,
         n_solves: climber.n_solves,
+        is_cut_short: climber.is_cut_short,
     })
 }
 
@@ -143,6 +152,8 @@ struct Climber<'c, 'b> {
     may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
     n_plans: usize,
     n_solves: usize,
+    reserve_s: f64,
+    is_cut_short: bool,
     /// Least load factor to keep of each goal of the ranks that were climbed.
     floors: Vec<f64>,
 }
@@ -162,6 +173,9 @@ impl<'b> Climber<'_, 'b> {
         let mut best = vec![first];
         for batch in others.chunks(BATCH) {
             self.ctx.check()?;
+            if self.is_time_over() {
+                break;
+            }
             // The least load factor of the last start kept is the bar for further starts.
             let floor = if best.len() < n {
                 0.0
@@ -181,6 +195,12 @@ impl<'b> Climber<'_, 'b> {
             best.truncate(n);
         }
         Ok(best)
+    }
+
+    /// Returns true if no more than the reserve is left of a limited time, and keeps that in mind.
+    fn is_time_over(&mut self) -> bool {
+        self.is_cut_short |= self.ctx.seconds_left() < self.reserve_s;
+        self.is_cut_short
     }
 
     /// Solves all goals of a rank.
@@ -222,7 +242,7 @@ impl<'b> Climber<'_, 'b> {
         self.complete(&mut at, rank)?;
         let mut peak = at.least_of(rank);
         let mut place = 0;
-        while self.n_solves < most_solves {
+        while self.n_solves < most_solves && !self.is_time_over() {
             let order = at.worst_first(rank);
             if place >= order.len() {
                 break;
@@ -286,6 +306,9 @@ impl<'b> Climber<'_, 'b> {
             }
             for batch in self.allowed(moves).chunks(BATCH) {
                 self.ctx.check()?;
+                if self.is_time_over() {
+                    return Ok(None);
+                }
                 let met = self.tried(batch, at, &asked)?;
                 let best = self.highest(met, rank);
                 if best.is_some() || self.n_solves >= most_solves {

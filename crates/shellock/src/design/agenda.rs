@@ -12,16 +12,19 @@
 //!      a step begins its level anew, and all levels within
 //! ```
 
+mod clock;
 mod table;
 #[cfg(test)]
 mod tests;
 
+use clock::Clock;
 use serde::{Deserialize, Serialize};
 pub(super) use table::Step;
 use table::{ANY, Level, TABLE};
 
 use super::Thickness;
-use super::params::Rounds;
+use super::cost::Cost;
+use super::params::{Params, Rounds};
 use super::ways::{Input, Walls, Way, ways};
 use crate::Ctx;
 use crate::sizes::SizeChoice;
@@ -36,9 +39,6 @@ const RATTLING_KEYS: usize = 2;
 const RESERVE: f64 = 1.4;
 /// Load factor at which a kit withstands its loads, but has no reserve.
 const ONCE: f64 = 1.0;
-/// Safety factor on the slowest kit so far. It covers measuring gaps, writing files, and the spread between
-/// kits.
-const SPREAD: f64 = 1.5;
 /// Bounds of every way to divide but the last one.
 const ROUNDS_BESIDE_OTHERS: Rounds = Rounds {
     kits: 1,
@@ -73,6 +73,10 @@ pub(super) struct Allowance {
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
+    /// Time to keep back for the kit while its plan is improved, s.
+    pub kit_reserve_s: f64,
+    /// Time without which the kit is not begun, s.
+    pub least_kit_s: f64,
 }
 
 impl Allowance {
@@ -154,6 +158,8 @@ pub(super) struct Report {
     pub offers: Vec<Step>,
     /// Change that it would have offered if more time were left.
     pub late: Option<Step>,
+    /// True if the plan would have been improved further if more time were left.
+    pub is_hurried: bool,
 }
 
 /// Cost of a job in work, which is the same on any machine, and the list of what was tried.
@@ -193,19 +199,6 @@ pub(super) struct Agenda {
     steps: Vec<Step>,
 }
 
-/// Times of the job, in seconds left; infinite without a clock.
-struct Clock {
-    total_s: f64,
-    /// Seconds left when the present wall and trial began.
-    wall_s: f64,
-    trial_s: f64,
-    /// Time of the slowest kit of the present way.
-    slowest_s: f64,
-    /// Number of pieces of the last kit, which tells how fast a coarser one is made.
-    n_pieces: usize,
-    is_cut_short: bool,
-}
-
 impl Agenda {
     /// Agenda of a whole job.
     pub fn new(ctx: &Ctx, input: &Input<'_>) -> Self {
@@ -220,17 +213,22 @@ impl Agenda {
         if input.labels.is_some() {
             forbidden.push(Step::JoinWeak);
         }
-        Self::with(ctx.seconds_left(), ways(input), params.rounds, forbidden)
+        Self::with(clock(ctx, params), ways(input), params.rounds, forbidden)
     }
 
     /// Agenda that only goes from key to key.
     pub fn of_keys(ctx: &Ctx, input: &Input<'_>) -> Self {
         let others = TABLE.map(|row| row.step).into_iter();
         let forbidden = others.filter(|step| *step != Step::NextKey).collect();
-        Self::with(ctx.seconds_left(), ways(input), input.params.rounds, forbidden)
+        Self::with(
+            clock(ctx, input.params),
+            ways(input),
+            input.params.rounds,
+            forbidden,
+        )
     }
 
-    fn with(total_s: f64, ways: Vec<Way>, rounds: Rounds, forbidden: Vec<Step>) -> Self {
+    fn with(clock: Clock, ways: Vec<Way>, rounds: Rounds, forbidden: Vec<Step>) -> Self {
         Self {
             ways,
             rounds,
@@ -241,14 +239,7 @@ impl Agenda {
             best: None,
             of_key: None,
             n_rattling: 0,
-            clock: Clock {
-                total_s,
-                wall_s: total_s,
-                trial_s: total_s,
-                slowest_s: 0.0,
-                n_pieces: 0,
-                is_cut_short: false,
-            },
+            clock,
             steps: Vec::new(),
         }
     }
@@ -266,6 +257,16 @@ impl Agenda {
     /// Sets the number of places for a key, once the model is divided.
     pub fn set_keys(&mut self, n_keys: usize) {
         self.n_keys = n_keys;
+    }
+
+    /// Learns what is expected of the present pieces.
+    pub fn foresee(&mut self, ctx: &Ctx, cost: Cost) {
+        self.clock.foresee(ctx, cost);
+    }
+
+    /// Time that the job needs for its first kit, s; `None` where its pieces are not known.
+    pub fn needed_s(&self, ctx: &Ctx) -> Option<f64> {
+        self.clock.needed_s(ctx)
     }
 
     /// Rules a step out until its count begins anew, since it could not be made.
@@ -290,17 +291,21 @@ impl Agenda {
 
     /// Begins a trial: what it may offer.
     pub fn allowance(&mut self, ctx: &Ctx) -> Allowance {
-        self.clock.trial_s = ctx.seconds_left();
+        self.clock.begin_trial(ctx);
         let n_divided = self.count(Step::Divide);
         Allowance {
             permits: TABLE.map(|row| self.permit(ctx, row.step)),
             asked: self.asked(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
+            kit_reserve_s: self.clock.kit_reserve_s(),
+            least_kit_s: self.clock.least_kit_s(),
         }
     }
 
     /// The next step after a trial; `None` at the end of the job.
     pub fn next(&mut self, ctx: &Ctx, report: &Report) -> Option<Step> {
+        self.clock.count_trial(report.kit.is_some());
+        self.clock.is_cut_short |= report.is_hurried;
         if let Some(grade) = report.kit {
             self.count_kit(ctx, grade);
         }
@@ -348,12 +353,8 @@ impl Agenda {
     }
 
     fn count_kit(&mut self, ctx: &Ctx, grade: Grade) {
-        let took_s = self.clock.trial_s - ctx.seconds_left();
-        if took_s.is_finite() {
-            self.clock.slowest_s = self.clock.slowest_s.max(took_s);
-        }
+        self.clock.end_kit(ctx, grade.n_pieces);
         self.n_kits += 1;
-        self.clock.n_pieces = grade.n_pieces;
         for best in [&mut self.best, &mut self.of_key] {
             if best.is_none_or(|best| grade.is_better_than(&best)) {
                 *best = Some(grade);
@@ -374,10 +375,13 @@ impl Agenda {
         }
         if begins >= Level::Wall {
             (self.best, self.n_rattling, self.n_keys) = (None, 0, 0);
-            self.clock.wall_s = ctx.seconds_left();
+            self.clock.begin_wall(ctx);
         }
         if begins >= Level::Way {
-            self.clock.slowest_s = 0.0;
+            self.clock.begin_way();
+        }
+        if begins >= Level::Division {
+            self.clock.count_division(begins >= Level::Wall);
         }
         self.steps.push(step);
     }
@@ -487,38 +491,39 @@ impl Agenda {
 
     /// True if a step would end after the time given.
     fn is_late(&self, ctx: &Ctx, step: Step) -> bool {
-        let clock = &self.clock;
-        let left_s = ctx.seconds_left();
-        let in_way_s = left_s - self.reserved_s();
-        let kit_s = SPREAD * clock.slowest_s;
-        let is_over = |left_s: f64, kit_s: f64| left_s < kit_s || left_s <= 0.0;
+        let reserved_s = self.reserved_s();
         match step {
             Step::Replan | Step::Remake | Step::Divide | Step::JoinRattling | Step::NextKey => {
-                is_over(in_way_s, kit_s)
+                self.clock.is_too_late_for_trial(ctx, reserved_s, 1.0)
             }
-            // It begins anew, so as much time must be left as this wall has taken.
-            Step::Thicken => 2.0 * in_way_s < clock.wall_s - self.reserved_s(),
-            Step::NextWay => is_over(left_s, self.share_of_next_way() * kit_s),
-            Step::Enlarge | Step::JoinPredicted | Step::JoinWeak | Step::LowerLoad => left_s <= 0.0,
+            Step::Thicken => self.clock.is_too_late_for_wall(ctx, reserved_s),
+            Step::NextWay => self
+                .clock
+                .is_too_late_for_trial(ctx, 0.0, self.share_of_next_way()),
+            Step::Enlarge | Step::JoinPredicted | Step::JoinWeak => self.clock.is_too_late_for_change(ctx),
+            Step::LowerLoad => self.clock.left_s(ctx) <= 0.0,
         }
     }
 
-    /// Seconds kept for the ways after the present one: the first has twice as much as each other.
+    /// Seconds kept for the ways after the present one.
     fn reserved_s(&self) -> f64 {
-        let (i, n) = (self.count(Step::NextWay), self.ways.len());
-        if i + 1 == n || self.clock.total_s.is_infinite() {
-            0.0
-        } else {
-            self.clock.total_s * (n - 1 - i) as f64 / (n + 1) as f64
-        }
+        self.clock.reserved_s(self.count(Step::NextWay), self.ways.len())
     }
 
     /// Time of a kit of the next way relative to one of this way: a coarser one takes less.
     fn share_of_next_way(&self) -> f64 {
         let next = self.ways.get(self.count(Step::NextWay) + 1);
         match next.and_then(|way| way.n_pieces) {
-            Some(n) if self.clock.n_pieces > 0 => (n as f64 / self.clock.n_pieces as f64).min(1.0),
+            Some(n) if self.clock.n_pieces() > 0 => (n as f64 / self.clock.n_pieces() as f64).min(1.0),
             _ => 1.0,
         }
+    }
+}
+
+/// Clock of a job: of work if that is limited, else of the time of its context.
+fn clock(ctx: &Ctx, params: &Params) -> Clock {
+    match params.effort_s {
+        Some(work_s) => Clock::of_work(work_s),
+        None => Clock::of_time(ctx.seconds_left()),
     }
 }

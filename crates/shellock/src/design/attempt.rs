@@ -15,7 +15,7 @@ use crate::handling::Handling;
 use crate::key::Turn;
 use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
 use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
-use crate::{Ctx, PatchId, key, metric, plan};
+use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
 
 /// Result of an attempt.
 pub(super) struct Found<T> {
@@ -27,6 +27,8 @@ pub(super) struct Found<T> {
     pub changes: Vec<Change>,
     /// Change that a lack of time rules out.
     pub late: Option<Step>,
+    /// True if a lack of time ended the improvement of its plan.
+    pub is_hurried: bool,
 }
 
 impl<T> Found<T> {
@@ -37,6 +39,7 @@ impl<T> Found<T> {
             failure,
             changes: Vec::new(),
             late: None,
+            is_hurried: false,
         }
     }
 
@@ -122,6 +125,11 @@ pub(super) fn make_kit(
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
+    // A kit that cannot be made in time is not begun.
+    if ctx.seconds_left() < allowance.least_kit_s {
+        return Err(DesignError::Cancelled(Cancelled));
+    }
+    let is_hurried = chosen.is_cut_short;
     let recipe = Recipe {
         params: job.input.params,
         division,
@@ -139,7 +147,11 @@ pub(super) fn make_kit(
         Err(lesson) => give_up(ctx, division, learned, &lesson, allowance)?,
     };
     let late = late.or(found.late);
-    Ok(Found { late, ..found })
+    Ok(Found {
+        late,
+        is_hurried,
+        ..found
+    })
 }
 
 /// A plan to make, with the step that a lack of time rules out; or the changes to make instead.
@@ -324,7 +336,9 @@ impl Planning<'_> {
     }
 
     /// Criteria by which plans are compared.
-    pub fn choice<'b>(&'b self, handling: &'b Handling) -> Choice<'b> {
+    ///
+    /// A climb keeps `reserve_s` back for the kit.
+    pub fn choice<'b>(&'b self, handling: &'b Handling, reserve_s: f64) -> Choice<'b> {
         Choice {
             params: &self.division.settings.plan,
             surface: &self.division.surface,
@@ -332,7 +346,10 @@ impl Planning<'_> {
             survey: self.survey,
             constraints: self.constraints,
             handling,
-            climb: ClimbParams::default(),
+            climb: ClimbParams {
+                reserve_s,
+                ..ClimbParams::default()
+            },
         }
     }
 }
@@ -361,11 +378,13 @@ pub(super) fn seek_plan(
     Ok(
         match plan_or_changes(ctx, division, &setup.learned, next, allowance)? {
             Ok((chosen, late)) => {
+                let is_hurried = chosen.is_cut_short;
                 let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
                 let planned = Planned::new(&setup.candidate.turn, &division.surface, chosen, warnings);
                 Found {
                     end: Some(planned),
                     late,
+                    is_hurried,
                     ..Found::nothing(Failure::default())
                 }
             }
@@ -404,7 +423,7 @@ pub(super) fn next_plan(
         }
     };
     let handling = planning.handling();
-    let choice = planning.choice(&handling);
+    let choice = planning.choice(&handling, allowance.kit_reserve_s);
     ctx.stage("what would rattle", 0)?;
     let foresight = Foresight::of(&choice, &found);
     let mut late = None;

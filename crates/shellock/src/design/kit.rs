@@ -137,11 +137,13 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         turn,
         grid,
         distances,
-        chosen: Chosen {
-            found,
-            holding,
-            deformed,
-        },
+        chosen:
+            Chosen {
+                found,
+                holding,
+                deformed,
+                ..
+            },
     } = recipe;
     let Division {
         surface,

@@ -71,17 +71,21 @@ pub enum DesignOutcome {
         blockers: Vec<Blocker>,
         /// True if the time was over before all was tried: with more of it one may be found.
         is_cut_short: bool,
+        /// Time that the first kit needs in all, s, where that can be said.
+        needed_s: Option<f64>,
     },
 }
 
 /// Reason why there is no plan.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct NoPlan {
     /// Explanation of the failure, for people.
     pub reason: String,
     /// True if the time was over before all was tried: with more of it one may be found.
     pub is_cut_short: bool,
+    /// Time that the first kit needs in all, s, where that can be said.
+    pub needed_s: Option<f64>,
 }
 
 /// The best end so far, a kit or a plan, and the reasons why other trials failed.
@@ -238,7 +242,7 @@ impl<T> Best<T> {
 
 impl Best<Planned> {
     /// Concludes a job that seeks a plan.
-    pub fn conclude(self, agenda: &Agenda) -> Result<Result<Planned, NoPlan>, DesignError> {
+    pub fn conclude(self, ctx: &Ctx, agenda: &Agenda) -> Result<Result<Planned, NoPlan>, DesignError> {
         let is_cut_short = agenda.is_cut_short();
         if let Some(kept) = self.kept {
             let mut planned = kept.end;
@@ -250,13 +254,15 @@ impl Best<Planned> {
             Err(error) if is_cut_short => error.to_string(),
             Err(error) => return Err(error),
         };
+        let needed_s = agenda.needed_s(ctx).filter(|_| is_cut_short);
         Ok(Err(NoPlan {
             reason: if is_cut_short {
-                report_lateness(&reason)
+                report_lateness(&reason, needed_s)
             } else {
                 reason
             },
             is_cut_short,
+            needed_s,
         }))
     }
 }
@@ -277,14 +283,16 @@ impl Best<Kit> {
                 Err(error) if is_cut_short => Failure::of(&error.to_string()),
                 why => why?,
             };
+            let needed_s = agenda.needed_s(ctx).filter(|_| is_cut_short);
             return Ok(DesignOutcome::NoPlan {
                 reason: if is_cut_short {
-                    report_lateness(&failure.reason)
+                    report_lateness(&failure.reason, needed_s)
                 } else {
                     failure.reason
                 },
                 blockers: failure.blockers,
                 is_cut_short,
+                needed_s,
             });
         };
         let mut design = finish(ctx, input, kept, effort)?;
@@ -386,11 +394,17 @@ pub(super) fn time_up(kits: usize) -> Warning {
     }
 }
 
-/// Adds to a reason that the time was over.
-pub(super) fn report_lateness(reason: &str) -> String {
+/// Reason why there is no kit where the time was over: the time that the first one needs, and what failed so
+/// far.
+pub(super) fn report_lateness(reason: &str, needed_s: Option<f64>) -> String {
+    /// Step of the time that is told, s.
+    const STEP_S: f64 = 10.0;
+    let needed = needed_s.map_or_else(String::new, |s| {
+        format!("; a kit takes about {:.0} s", (s / STEP_S).ceil() * STEP_S)
+    });
     match reason {
-        "" => "the time was over (--time)".to_owned(),
-        reason => format!("the time was over (--time); {reason}"),
+        "" => format!("the time was over before a kit was made (--time){needed}"),
+        reason => format!("the time was over before a kit was made (--time){needed}; so far {reason}"),
     }
 }
 

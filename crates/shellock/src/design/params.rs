@@ -57,6 +57,9 @@ pub struct Params {
     pub is_play_together: bool,
     /// Limits on planning and making another kit after one failed its verification.
     pub rounds: Rounds,
+    /// Work after which nothing else is tried, processor seconds of a reference machine; > 0. Unlike a limit
+    /// of time, it gives the same kit on any machine. None.
+    pub effort_s: Option<f64>,
 }
 
 impl Default for Params {
@@ -81,6 +84,7 @@ impl Default for Params {
             allows_thin: false,
             is_play_together: false,
             rounds: Rounds::default(),
+            effort_s: None,
         }
     }
 }

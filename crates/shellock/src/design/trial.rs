@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::agenda::{Agenda, CUT_KEYS, Effort, Step};
 use super::attempt::Failure;
 use super::candidate::{self, Candidate};
+use super::cost::Cost;
 use super::division::{Division, WallGrid};
 use super::lesson::Lesson;
 use super::wall::{Thicker, Wall};
@@ -284,7 +285,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Takes the present place for the key, and the pieces as they are divided.
-    fn use_key(&mut self, ctx: &Ctx, agenda: &Agenda) -> Result<Option<Failure>, DesignError> {
+    fn use_key(&mut self, ctx: &Ctx, agenda: &mut Agenda) -> Result<Option<Failure>, DesignError> {
         self.setup = None;
         let site = self.site(agenda);
         if let Some(site) = &site {
@@ -302,6 +303,7 @@ impl<'a> Trial<'a> {
             return Ok(Some(Failure::of("the key falls apart")));
         };
         self.effort.segmentations += 1;
+        agenda.foresee(ctx, Cost::of(&division.surface));
         let mut setup = Setup {
             candidate,
             division,
@@ -337,6 +339,7 @@ impl<'a> Trial<'a> {
             return Ok(Some(Failure::default()));
         };
         self.effort.segmentations += 1;
+        agenda.foresee(ctx, Cost::of(&next.surface));
         let (n, before) = (next.surface.n_patches, setup.division.surface.n_patches);
         ctx.note(&match (&warning, step) {
             (Some(warning), _) => format!("{warning}: {n} pieces"),

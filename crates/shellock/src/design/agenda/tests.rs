@@ -95,7 +95,7 @@ impl Story {
         let left = || self.time_s - gone_s.load(Relaxed) as f64;
         let ctx = Ctx::quiet().with_deadline(&left);
         let (rounds, forbidden) = (Rounds::default(), self.forbidden.clone());
-        let mut agenda = Agenda::with(left(), self.ways.clone(), rounds, forbidden);
+        let mut agenda = Agenda::with(Clock::of_time(left()), self.ways.clone(), rounds, forbidden);
         agenda.set_keys(self.n_keys);
         let mut trials = Vec::new();
         for i in 0..1000 {
@@ -286,7 +286,7 @@ fn of_two_kits_the_one_with_fewer_failures_is_better_then_the_one_that_rattles_l
 
 #[test]
 fn the_first_way_has_twice_the_time_of_each_other() {
-    let mut agenda = Agenda::with(50.0, four_ways(), Rounds::default(), Vec::new());
+    let mut agenda = Agenda::with(Clock::of_time(50.0), four_ways(), Rounds::default(), Vec::new());
     let mut ends = Vec::new();
     for _ in 0..4 {
         ends.push(50.0 - agenda.reserved_s());
@@ -326,7 +326,12 @@ fn a_thicker_wall_is_tried_only_if_as_much_time_is_left_as_the_present_one_has_t
     for (left_s, permit) in [(60.0, Permit::Yes), (40.0, Permit::Late)] {
         let left = || left_s;
         let ctx = Ctx::quiet().with_deadline(&left);
-        let mut agenda = Agenda::with(100.0, four_ways()[..1].to_vec(), Rounds::default(), Vec::new());
+        let mut agenda = Agenda::with(
+            Clock::of_time(100.0),
+            four_ways()[..1].to_vec(),
+            Rounds::default(),
+            Vec::new(),
+        );
         agenda.set_keys(4);
         assert_eq!(agenda.allowance(&ctx).permit(Step::Thicken), permit);
         let late = Report {
@@ -343,7 +348,12 @@ fn a_change_before_a_kit_is_made_though_the_time_ends_and_then_no_more_are_allow
     let gone_s = AtomicU64::new(0);
     let left = || 10.0 - gone_s.load(Relaxed) as f64;
     let ctx = Ctx::quiet().with_deadline(&left);
-    let mut agenda = Agenda::with(left(), four_ways()[..1].to_vec(), Rounds::default(), Vec::new());
+    let mut agenda = Agenda::with(
+        Clock::of_time(left()),
+        four_ways()[..1].to_vec(),
+        Rounds::default(),
+        Vec::new(),
+    );
     agenda.set_keys(1);
     for step in [Step::Enlarge, Step::JoinPredicted, Step::JoinWeak] {
         gone_s.store(0, Relaxed);
