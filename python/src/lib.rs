@@ -13,10 +13,10 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use serde_json::{Map, Value};
 use shellock_check::{Finding, Verdict};
-use shellock_cli::embed::{self, News, Problem, Request, Source};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_job::Options;
+use shellock_job::embed::{self, News, Problem, Request, Source};
 
 create_exception!(
     _native,
@@ -48,7 +48,7 @@ impl Kit {
     }
 
     fn warnings(&self) -> String {
-        self.0.warnings.to_string()
+        json(&self.0.warnings)
     }
 
     fn pieces<'py>(&self, py: Python<'py>) -> Vec<Arrays<'py>> {
@@ -134,7 +134,7 @@ fn verify(
     let told = waited(py, None, |_, stop| {
         embed::verify(&meshes, &pulled_out_along, clearance, stop)
     })?;
-    Ok(told.to_string())
+    Ok(json(&told))
 }
 
 /// Checks the certificate in a kit's folder. Returns claim, verdict and figure of each finding.
@@ -192,14 +192,14 @@ fn is_of_kit(name: &str) -> bool {
 /// Returns all options, as a JSON list.
 #[pyfunction]
 fn options() -> String {
-    embed::options().to_string()
+    json(&embed::options())
 }
 
 /// Input of a job, copied so that no Python object is needed while it runs.
 struct Input {
     mesh: TriMesh,
     labels: Option<Vec<i32>>,
-    options: Map<String, Value>,
+    options: Options,
 }
 
 impl Input {
@@ -225,8 +225,14 @@ impl Input {
     }
 }
 
-fn chosen(options: &str) -> PyResult<Map<String, Value>> {
-    serde_json::from_str(options).map_err(|e| raised(wrong(format!("options: {e}"))))
+/// Reads options from a JSON object with their names and values.
+fn chosen(options: &str) -> PyResult<Options> {
+    let values = serde_json::from_str(options).map_err(|e| raised(wrong(format!("options: {e}"))))?;
+    Options::named(&values).map_err(|failure| raised(failure.into()))
+}
+
+fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).expect("numbers and strings can be written")
 }
 
 fn mesh(points: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'_, u32>) -> PyResult<TriMesh> {

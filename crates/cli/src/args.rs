@@ -1,28 +1,18 @@
 //! Command-line arguments: commands, options, and the values that they take.
 
 mod blows;
-mod keep_whole;
 mod options;
-mod pieces;
 
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::OnceLock;
 
-use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use shellock::coupon::N_FITS;
-use shellock::piece::LabelParams;
-use shellock::sizes::SizeChoice;
-use shellock_geom::repair::InsideOut;
+use shellock_job::options::{printer_called, units};
 use shellock_print::Printer;
-use shellock_print::booklet::Paper;
 
-pub use blows::{Blows, Place};
-pub use options::Options;
-pub use pieces::Pieces;
-
-use crate::names::no_such;
-use crate::units;
+pub use blows::Blows;
+pub use options::JobOptions;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed \
@@ -76,7 +66,7 @@ pub enum Command {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
         #[command(flatten)]
-        options: Options,
+        options: JobOptions,
         #[command(flatten)]
         out: Out,
     },
@@ -86,7 +76,7 @@ pub enum Command {
         #[arg(long, default_value = "squirrel", value_name = "NAME")]
         figure: String,
         #[command(flatten)]
-        options: Options,
+        options: JobOptions,
         #[command(flatten)]
         out: Out,
     },
@@ -96,7 +86,7 @@ pub enum Command {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
         #[command(flatten)]
-        options: Options,
+        options: JobOptions,
         /// File to write, with the ending .ply, .3mf or .seg
         #[arg(short, long, value_name = "FILE")]
         out: PathBuf,
@@ -106,7 +96,7 @@ pub enum Command {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface, such as one that `segment` wrote
         model: PathBuf,
         #[command(flatten)]
-        options: Options,
+        options: JobOptions,
     },
     /// Check a finished kit again from its files, or an assembly of your own
     Verify {
@@ -159,7 +149,7 @@ pub enum Command {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file
         model: PathBuf,
         #[command(flatten)]
-        options: Options,
+        options: JobOptions,
         /// Also divide the surface, by its labels or else by --method, and say where the seams run, who sees
         /// them and how pieces hold each other
         #[arg(long, help_heading = "Pieces")]
@@ -234,39 +224,39 @@ const EXAMPLES: [(&str, &str); 8] = [
 const NOT_TO_DIVIDE: [&str; 22] = [
     "key",
     "time",
-    "plan_time",
+    "plan-time",
     "thickness",
     "material",
     "drop",
     "connector",
     "clearance",
-    "key_clearance",
+    "key-clearance",
     "detent",
-    "key_ribs",
-    "play_together",
-    "allow_thin",
-    "key_grip",
-    "no_labels",
+    "key-ribs",
+    "play-together",
+    "allow-thin",
+    "key-grip",
+    "no-labels",
     "paper",
-    "no_booklet",
-    "seam_gap",
-    "min_wall",
+    "no-booklet",
+    "seam-gap",
+    "min-wall",
     "grid",
     "config",
     "resolution",
 ];
 /// Options of `build` that planning alone does not use.
 const NOT_TO_PLAN: [&str; 6] = [
-    "key_grip",
-    "no_labels",
+    "key-grip",
+    "no-labels",
     "paper",
-    "no_booklet",
-    "play_together",
-    "allow_thin",
+    "no-booklet",
+    "play-together",
+    "allow-thin",
 ];
 
 /// Options that belong to one model and make no sense in a batch.
-const NOT_TO_MANY: [&str; 2] = ["labels", "keep_whole"];
+const NOT_TO_MANY: [&str; 2] = ["labels", "keep-whole"];
 
 /// Builds all commands. Each command's help shows only the options that it uses, and examples.
 pub fn command() -> clap::Command {
@@ -302,7 +292,7 @@ pub struct BatchOptions {
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = units::seconds)]
     pub patience: f64,
     #[command(flatten)]
-    pub options: Options,
+    pub options: JobOptions,
 }
 
 /// Folder that a kit is written to.
@@ -348,186 +338,5 @@ impl CouponOptions {
     /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
         printer_called(&self.printer, &self.own_printers)
-    }
-}
-
-/// An axis of the file.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Axis {
-    X,
-    Y,
-    Z,
-}
-
-impl Axis {
-    /// Index of the axis: 0, 1 or 2.
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Returns the axis whose unit vector is `along`, or `None` if there is none.
-    pub fn of(along: [f64; 3]) -> Option<Self> {
-        [Self::X, Self::Y, Self::Z]
-            .into_iter()
-            .find(|a| a.unit() == along)
-    }
-
-    /// Unit vector along the axis.
-    pub fn unit(self) -> [f64; 3] {
-        std::array::from_fn(|axis| f64::from(u8::from(axis == self.index())))
-    }
-}
-
-/// A unit of length.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Unit {
-    Micron,
-    Mm,
-    Cm,
-    Inch,
-    Foot,
-    M,
-}
-
-impl Unit {
-    /// Length of one unit, mm.
-    pub fn mm(self) -> f64 {
-        match self {
-            Self::Micron => 1e-3,
-            Self::Mm => 1.0,
-            Self::Cm => 10.0,
-            Self::Inch => 25.4,
-            Self::Foot => 304.8,
-            Self::M => 1000.0,
-        }
-    }
-}
-
-/// Paper size of the booklet.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PaperSize {
-    A4,
-    Letter,
-}
-
-impl From<PaperSize> for Paper {
-    fn from(size: PaperSize) -> Self {
-        match size {
-            PaperSize::A4 => Self::A4,
-            PaperSize::Letter => Self::Letter,
-        }
-    }
-}
-
-/// Meaning of a body that is inside out and overlaps another.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum InsideOutMeans {
-    /// Nobody knows: the model is refused
-    Ask,
-    /// A hole in the body that it overlaps
-    Cut,
-    /// A part of the model, united with the body that it overlaps
-    Unite,
-}
-
-impl InsideOutMeans {
-    /// Returns the library's value for this choice.
-    pub fn meant(self) -> InsideOut {
-        match self {
-            Self::Ask => InsideOut::Ask,
-            Self::Cut => InsideOut::Cut,
-            Self::Unite => InsideOut::Unite,
-        }
-    }
-}
-
-/// Data of a file that are taken as labels.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum LabelsFrom {
-    /// Labels of faces, or paint of a slicer
-    Auto,
-    /// A property of the faces (PLY)
-    Labels,
-    /// Multi-material paint of a slicer (3MF)
-    Paint,
-    /// Colours of faces (STL, PLY, OFF, 3MF) or of points (PLY, OBJ, OFF, glTF)
-    Colors,
-    /// Materials (OBJ, 3MF, glTF)
-    Materials,
-    /// Groups of faces (OBJ)
-    Groups,
-    /// Named sets of triangles (3MF)
-    Sets,
-    /// Objects, solids or nodes
-    Objects,
-    /// Nothing: pieces are found automatically
-    None,
-}
-
-/// Wall thickness: chosen automatically, or given in mm.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Thickness {
-    Auto,
-    Mm(f64),
-}
-
-impl FromStr for Thickness {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text.eq_ignore_ascii_case("auto") {
-            return Ok(Self::Auto);
-        }
-        units::length_mm(text)
-            .map(Self::Mm)
-            .map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
-    }
-}
-
-/// Parses the size of all connectors: a length, or `auto`.
-fn connector_size(text: &str) -> Result<SizeChoice, String> {
-    let length = |_| units::length_mm(text).map(SizeChoice::Fixed);
-    let size = text.to_ascii_lowercase().parse().or_else(length);
-    size.map_err(|_: String| "give millimetres, such as 2.5, or auto".to_owned())
-}
-
-/// Finds a printer by name, in any case: one of the user's `own`, or one that comes with the program.
-fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
-    let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
-    let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
-    let names: Vec<&str> = known.iter().map(|p| p.name.as_str()).collect();
-    found.ok_or_else(|| no_such("printer", name, &names))
-}
-
-/// Parameters for engraved numbers: strokes two lines wide, and a wall behind them that the printer can make.
-fn label(min_wall_mm: f64) -> LabelParams {
-    let usual = LabelParams::default();
-    let two_lines_mm = 2.0 * min_wall_mm;
-    // A wrong wall is reported as a wrong wall, not as a wrong stroke.
-    let within = |usual: f64, most: f64| {
-        if two_lines_mm.is_finite() {
-            usual.max(two_lines_mm).min(most)
-        } else {
-            usual
-        }
-    };
-    LabelParams {
-        stroke_mm: within(usual.stroke_mm, 2.0),
-        least_wall_mm: within(usual.least_wall_mm, 5.0),
-        ..usual
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn connectors_have_a_length_or_a_size_by_stress() {
-        for (text, mm) in [("4", 4.0), ("4mm", 4.0), ("0.3 cm", 3.0)] {
-            assert_eq!(connector_size(text), Ok(SizeChoice::Fixed(mm)), "{text}");
-        }
-        assert!(matches!(connector_size("Auto"), Ok(SizeChoice::Auto(_))));
-        assert!(connector_size("large").is_err_and(|why| why.contains("2.5, or auto")));
     }
 }

@@ -2,33 +2,16 @@
 //! while files are being written.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+use shellock_job::files::Writing;
 
 /// Time for stages to end by themselves.
 const PATIENCE: Duration = Duration::from_millis(300);
 
 /// Interval at which the end of writing is checked.
 const LOOK: Duration = Duration::from_millis(5);
-
-/// Number of writers with files or folders that must not be left behind.
-static N_WRITING: AtomicUsize = AtomicUsize::new(0);
-
-/// Guard that keeps the program running while files are written.
-pub struct Writing(());
-
-impl Writing {
-    pub fn begin() -> Self {
-        N_WRITING.fetch_add(1, Ordering::SeqCst);
-        Self(())
-    }
-}
-
-impl Drop for Writing {
-    fn drop(&mut self) {
-        N_WRITING.fetch_sub(1, Ordering::SeqCst);
-    }
-}
 
 /// On Ctrl-C, sets `stop`; a moment later calls `end`, and the program ends with code 130.
 pub fn watch(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Copy + 'static) {
@@ -53,7 +36,7 @@ fn stop_soon(stop: &Arc<AtomicBool>, end: impl Fn() + Send + 'static) {
     }
     std::thread::spawn(move || {
         std::thread::sleep(PATIENCE);
-        while N_WRITING.load(Ordering::SeqCst) > 0 {
+        while Writing::is_going_on() {
             std::thread::sleep(LOOK);
         }
         end();

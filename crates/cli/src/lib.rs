@@ -1,42 +1,13 @@
-//! Command line of Shellock: arguments → parameters → library → files. Programs can embed the same jobs
-//! ([`embed`]).
+//! Command line of Shellock: arguments, progress and messages in a terminal. Jobs themselves are those of
+//! [`shellock_job`], which programs can embed.
 
 mod args;
-mod batch;
-mod bears;
-mod bed;
-mod build;
-mod choices;
+mod commands;
 mod config;
-mod coupon;
-mod course;
-mod division;
-pub mod embed;
-mod failure;
-mod input;
-mod inspect;
 mod interrupt;
-mod loads;
 mod manual;
-mod names;
-mod output;
-mod own_assembly;
-mod page;
-mod paint;
-mod place;
-mod printing;
+mod print;
 mod progress;
-mod project;
-mod savings;
-mod shape;
-mod shares;
-mod stages;
-mod stopwatch;
-mod stress;
-mod studio;
-mod tabs;
-mod told;
-mod units;
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -46,13 +17,12 @@ use clap::error::ErrorKind;
 use serde_json::json;
 
 use args::Command;
-use failure::Failure;
+use commands::{
+    batch, build, coupon, figure, inspect, own_assembly, plan, report, segment, studio, test, verify,
+};
 pub use manual::options_guide;
-
-/// Programs in the guide, compiled and run with the tests.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/guide/library.md")]
-struct Guide;
+use shellock_job::Failure;
+use shellock_job::own_assembly::ASSEMBLY;
 
 /// Settings and state that every command gets.
 pub struct Session {
@@ -62,31 +32,23 @@ pub struct Session {
     pub is_verbose: bool,
     /// Form in which progress is shown.
     pub shown: progress::Shown,
-    /// Flag that becomes true with Ctrl-C.
-    pub stop: Arc<AtomicBool>,
-    /// Start time of the program.
-    pub since: std::time::Instant,
+    /// Stop flag, which becomes true with Ctrl-C, start time, and display of single stages.
+    pub job: shellock_job::Session,
 }
 
 impl Session {
-    /// Creates a session that shows nothing and ends with `stop`.
-    fn silent(stop: &Arc<AtomicBool>) -> Self {
+    /// Creates a session that begins now.
+    fn new(cli: &args::Cli) -> Self {
+        let shown = shown(cli);
+        let stop = Arc::new(AtomicBool::new(false));
         Self {
-            is_json: false,
-            is_verbose: false,
-            shown: progress::Shown::Nothing,
-            stop: Arc::clone(stop),
-            since: std::time::Instant::now(),
+            is_json: cli.json,
+            is_verbose: cli.verbose,
+            shown,
+            job: shellock_job::Session::new(&stop, move |name| {
+                Box::new(progress::OneStage::begin(shown, name))
+            }),
         }
-    }
-
-    /// Runs `work` and shows progress under `name` meanwhile.
-    pub fn during<T>(&self, name: &str, work: impl FnOnce() -> T) -> T {
-        let display = progress::Display::new(self.shown);
-        display.show(shellock::context::Progress::Stage { name, n_steps: 0 });
-        let done = work();
-        display.finish();
-        done
     }
 }
 
@@ -124,13 +86,7 @@ pub fn command_line() -> ExitCode {
             None => tell(panic),
         }
     }));
-    let session = Session {
-        is_json: cli.json,
-        is_verbose: cli.verbose,
-        shown: shown(&cli),
-        stop: Arc::new(AtomicBool::new(false)),
-        since: std::time::Instant::now(),
-    };
+    let session = Session::new(&cli);
     let is_json = session.is_json;
     let is_batch = matches!(cli.command, Command::Batch(_));
     let told = move || {
@@ -141,9 +97,9 @@ pub fn command_line() -> ExitCode {
         };
         refuse(is_json, &stopped.to_string(), stopped.exit_code());
     };
-    interrupt::watch(&session.stop, told);
+    interrupt::watch(&session.job.stop, told);
     if cli.stop_with_stdin {
-        interrupt::watch_stdin(&session.stop, told);
+        interrupt::watch_stdin(&session.job.stop, told);
     }
     if let Some(n) = cli.threads
         && let Err(e) = rayon::ThreadPoolBuilder::new()
@@ -205,27 +161,27 @@ fn shown(cli: &args::Cli) -> progress::Shown {
 fn run(session: &Session, command: Command) -> Result<u8, Failure> {
     use inspect::Wanted;
     match command {
-        Command::Build { model, options, out } => build::build(session, &model, &options, out),
-        Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
-        Command::Segment { model, options, out } => stages::segment(session, &model, &options, &out),
-        Command::Plan { model, options } => stages::plan(session, &model, &options),
-        Command::Verify { kit, model } if kit.join(own_assembly::ASSEMBLY).is_file() => {
+        Command::Build { model, options, out } => build::build(session, &model, &options.options, out),
+        Command::Demo { figure, options, out } => build::demo(session, &figure, &options.options, out),
+        Command::Segment { model, options, out } => segment::segment(session, &model, &options.options, &out),
+        Command::Plan { model, options } => plan::plan(session, &model, &options.options),
+        Command::Verify { kit, model } if kit.join(ASSEMBLY).is_file() => {
             own_assembly::verify(session, &kit, model.as_deref())
         }
-        Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
-        Command::Test { kit, blows } => stress::test(session, &kit, &blows),
+        Command::Verify { kit, model } => verify::verify(session, &kit, model.as_deref()),
+        Command::Test { kit, blows } => test::test(session, &kit, &blows),
         Command::Report {
             kit,
             model,
             closed_form,
-        } => savings::report(session, &kit, model.as_deref(), closed_form),
+        } => report::report(session, &kit, model.as_deref(), closed_form),
         Command::Inspect {
             model,
             options,
             segment,
         } => {
             let wanted = if segment { Wanted::Division } else { Wanted::File };
-            inspect::inspect(session, &model, &options, wanted)
+            inspect::inspect(session, &model, &options.options, wanted)
         }
         Command::Coupon(options) => coupon::coupon(session, &options),
         Command::Studio(options) => studio::studio(session, &options),
@@ -237,6 +193,6 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
             out,
             size,
             labels,
-        } => stages::figure(&name, &out, size, labels.as_deref()),
+        } => figure::figure(&name, &out, size, labels.as_deref()),
     }
 }

@@ -6,9 +6,11 @@ use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+use shellock_job::Failure;
+use shellock_job::files::write as write_file;
+
 use crate::args;
-use crate::failure::Failure;
-use crate::stages::write as write_file;
+
 pub use guide::options_guide;
 
 /// Runs `shellock completions` and returns the exit code.

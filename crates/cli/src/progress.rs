@@ -5,20 +5,17 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
 use shellock::context::Progress;
-
-use crate::course::{Course, Stand};
-use crate::stopwatch::{StageTime, Stopwatch};
+use shellock_job::child::Event;
+use shellock_job::course::{Course, Stand};
+use shellock_job::stopwatch::{StageTime, Stopwatch};
 
 /// Form in which progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// A bar on a terminal, plain lines elsewhere.
     ForPeople,
-    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, for stages of a kit also
-    /// `number`, `n_stages` and `seconds_left` (null at first); `{"event": "note", "text", "seconds"}`; at
-    /// the end `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
+    /// An [`Event`] in JSON a line.
     Events,
     /// No progress is shown.
     Nothing,
@@ -83,20 +80,22 @@ impl Display {
 
     fn show_event(&self, progress: &Progress<'_>) {
         let seconds = (1000.0 * self.since.elapsed().as_secs_f64()).round() / 1000.0;
-        match progress {
+        match *progress {
             Progress::Stage { name, n_steps } => {
-                let mut event =
-                    json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds });
-                if let Some(stand) = self.stand(name) {
-                    event["number"] = stand.number.into();
-                    event["n_stages"] = stand.of.into();
-                    event["seconds_left"] = stand.left.map(|left| left.as_secs_f64().round()).into();
-                }
-                eprintln!("{event}");
+                let stand = self.stand(name);
+                print_event(&Event::Stage {
+                    n_stages: stand.map(|stand| stand.of),
+                    n_steps,
+                    name: name.to_owned(),
+                    number: stand.map(|stand| stand.number),
+                    seconds,
+                    seconds_left: stand.map(|stand| stand.left.map(|left| left.as_secs_f64().round())),
+                });
             }
-            Progress::Note(text) => {
-                eprintln!("{}", json!({ "event": "note", "text": text, "seconds": seconds }))
-            }
+            Progress::Note(text) => print_event(&Event::Note {
+                seconds,
+                text: text.to_owned(),
+            }),
             Progress::Step => {}
         }
     }
@@ -132,11 +131,10 @@ impl Display {
     /// Removes the last bar; with events, also prints the time that the stages took.
     pub fn finish(&self) {
         if self.shown == Shown::Events {
-            let seconds = self.since.elapsed().as_secs_f64();
-            eprintln!(
-                "{}",
-                json!({ "event": "effort", "stages": self.stages(), "seconds": seconds })
-            );
+            print_event(&Event::Effort {
+                seconds: self.since.elapsed().as_secs_f64(),
+                stages: self.stages(),
+            });
         }
         if let Some(bar) = self.bar.lock().expect("no holder of this lock panics").take() {
             bar.finish_and_clear();
@@ -144,60 +142,26 @@ impl Display {
     }
 }
 
-/// Time by which the whole job should be done.
-pub struct Deadline(Option<Instant>);
+fn print_event(event: &Event) {
+    let text = serde_json::to_string(event).expect("numbers and strings can be written");
+    eprintln!("{text}");
+}
 
-impl Deadline {
-    /// Deadline `seconds` after `since`; none if `seconds` is 0.
-    pub fn new(seconds: f64, since: Instant) -> Self {
-        let time = Duration::try_from_secs_f64(seconds).ok();
-        let time = time.filter(|time| !time.is_zero());
-        Self(time.and_then(|time| since.checked_add(time)))
-    }
+/// Display of a single stage, which ends when it is dropped.
+pub struct OneStage(Display);
 
-    /// Time left, s: negative after the deadline, infinite if there is none.
-    pub fn seconds_left(&self) -> f64 {
-        let Some(at) = self.0 else {
-            return f64::INFINITY;
-        };
-        let now = Instant::now();
-        at.checked_duration_since(now)
-            .map_or_else(|| -(now - at).as_secs_f64(), |left| left.as_secs_f64())
+impl OneStage {
+    /// Shows the stage `name`.
+    pub fn begin(shown: Shown, name: &str) -> Self {
+        let display = Display::new(shown);
+        display.show(Progress::Stage { name, n_steps: 0 });
+        Self(display)
     }
 }
 
-/// Limits the time of the current search for a plan.
-pub struct PlanClock {
-    since: Mutex<Instant>,
-    limit: Duration,
-}
-
-impl PlanClock {
-    /// Clock for searches that were allowed the work of `plan_time_s`. They get twice that time, and 10 s
-    /// more to find a first plan.
-    pub fn new(plan_time_s: f64) -> Self {
-        const GRACE_S: f64 = 10.0;
-        let limit = Duration::try_from_secs_f64(2.0 * plan_time_s + GRACE_S).unwrap_or(Duration::MAX);
-        Self {
-            since: Mutex::new(Instant::now()),
-            limit,
-        }
-    }
-
-    /// Restarts the clock at every stage, so that each search has its own time.
-    pub fn see(&self, progress: &Progress<'_>) {
-        if let Progress::Stage { .. } = progress {
-            *self.since.lock().expect("no holder of this lock panics") = Instant::now();
-        }
-    }
-
-    /// Returns true if the stage has taken longer than planning may.
-    pub fn is_up(&self) -> bool {
-        self.since
-            .lock()
-            .expect("no holder of this lock panics")
-            .elapsed()
-            > self.limit
+impl Drop for OneStage {
+    fn drop(&mut self) {
+        self.0.finish();
     }
 }
 

@@ -12,8 +12,9 @@ use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use crate::Address;
+use crate::refusal::Refusal;
 use crate::routes::Studio;
-use crate::{Address, Refusal};
 
 /// Length of a token in bytes: nobody guesses 256 bits.
 const TOKEN_BYTES: usize = 32;

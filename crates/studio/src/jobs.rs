@@ -1,21 +1,17 @@
 //! Queue of kits to make: one process runs, others wait, each can be stopped.
-//!
-//! A process is the program itself with `--json`. It reports progress as lines of JSON on standard error, and
-//! the result on standard output. It ends when its standard input is closed, so none outlives this server. A
-//! stopped process that does not end is killed.
 
 use std::collections::VecDeque;
-use std::process::Stdio;
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use serde_json::Value;
-use tokio::io::{AsyncBufReadExt, AsyncReadExt, BufReader};
-use tokio::process::{Child, ChildStderr, ChildStdout, Command};
+use shellock_job::child::{self, Ended, TO_STOP};
 use tokio::sync::{Notify, broadcast};
 
-use crate::{Refusal, Task, Workshop};
+use crate::refusal::Refusal;
 
 /// Number of notes kept per job, the latest.
 const MOST_NOTES: usize = 200;
@@ -24,12 +20,6 @@ const MOST_KEPT: usize = 50;
 const MOST_WAITING: usize = 8;
 /// Number of events that a slow page may be behind; it reloads the project after missing more.
 const MOST_EVENTS: usize = 256;
-/// Time that a stopped process has to end by itself before it is killed.
-///
-/// `build` ends 0.3 s after its standard input is closed, or when the files that it is writing are complete:
-/// `batch` waits as long.
-const TO_STOP: Duration = Duration::from_secs(10);
-
 /// Progress of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -52,8 +42,8 @@ pub struct Job {
     pub state: State,
     /// Name of the current stage; its number, from 1, and the number of stages, both 0 while unknown.
     pub stage: String,
-    pub number: u64,
-    pub n_stages: u64,
+    pub number: usize,
+    pub n_stages: usize,
     pub seconds_left: Option<f64>,
     /// Time since the job began to run, s.
     pub seconds: f64,
@@ -63,9 +53,9 @@ pub struct Job {
     pub exit_code: Option<i32>,
     #[serde(skip)]
     since: Option<Instant>,
-    /// Notified when the process is to stop.
+    /// Flag that stops the process.
     #[serde(skip)]
-    stop: Arc<Notify>,
+    stop: Arc<AtomicBool>,
 }
 
 impl Job {
@@ -108,25 +98,28 @@ impl Job {
         }
     }
 
-    /// Processes a line of the process's standard error.
-    fn hear(&mut self, line: &str) {
-        let Ok(event) = serde_json::from_str::<Value>(line) else {
-            return;
-        };
-        match event["event"].as_str() {
-            Some("stage") => {
-                self.stage = event["name"].as_str().unwrap_or_default().to_owned();
-                if let (Some(number), Some(of)) = (event["number"].as_u64(), event["n_stages"].as_u64()) {
+    /// Processes an event of the process.
+    fn hear(&mut self, event: child::Event) {
+        match event {
+            child::Event::Stage {
+                name,
+                number,
+                n_stages,
+                seconds_left,
+                ..
+            } => {
+                self.stage = name;
+                if let (Some(number), Some(of)) = (number, n_stages) {
                     (self.number, self.n_stages) = (number, of);
-                    self.seconds_left = event["seconds_left"].as_f64();
+                    self.seconds_left = seconds_left.flatten();
                 }
             }
-            Some("note") => {
-                self.notes.extend(event["text"].as_str().map(str::to_owned));
+            child::Event::Note { text, .. } => {
+                self.notes.push(text);
                 let excess = self.notes.len().saturating_sub(MOST_NOTES);
                 self.notes.drain(..excess);
             }
-            _ => {}
+            child::Event::Effort { .. } => {}
         }
     }
 }
@@ -139,22 +132,12 @@ pub enum Event {
     Project,
 }
 
-/// The part of a [`Workshop`] that makes kits.
+/// Source of the commands that make kits.
 pub trait Maker: Send + Sync + 'static {
-    /// Returns the next task, as [`Workshop::task`].
-    fn task(&self) -> Result<Task, Refusal>;
-    /// Reports its end, as [`Workshop::ended`].
+    /// Returns the command that makes the next kit.
+    fn task(&self) -> Result<Command, Refusal>;
+    /// Takes notice of the end of a command: its exit code, `None` after a signal, and its standard output.
     fn ended(&self, code: Option<i32>, output: &str);
-}
-
-impl Maker for Arc<dyn Workshop> {
-    fn task(&self) -> Result<Task, Refusal> {
-        (**self).task()
-    }
-
-    fn ended(&self, code: Option<i32>, output: &str) {
-        (**self).ended(code, output);
-    }
 }
 
 /// All jobs of this server.
@@ -221,10 +204,17 @@ impl Jobs {
             if !job.is_over() {
                 job.seconds = job.told().seconds;
                 job.state = State::Stopped;
-                job.stop.notify_one();
+                job.stop.store(true, Ordering::Relaxed);
             }
         })
         .ok_or_else(|| Refusal::missing("there is no such job"))
+    }
+
+    /// Stops all jobs, because the server ends.
+    pub fn close(&self) {
+        for job in self.lock().iter() {
+            job.stop.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Runs job after job; never returns.
@@ -242,33 +232,41 @@ impl Jobs {
         }
     }
 
-    async fn run_one(&self, id: u64) {
+    async fn run_one(self: &Arc<Self>, id: u64) {
+        let jobs = Arc::clone(self);
+        // A panic there is reported where it happens; the next job is not affected.
+        let _ = tokio::task::spawn_blocking(move || jobs.make(id)).await;
+    }
+
+    /// Makes the kit of a job, if it still waits.
+    fn make(&self, id: u64) {
         let begun = self.change(id, Job::begin);
         let Some(job) = begun.filter(|job| job.state == State::Running) else {
             // The job was stopped before it began.
             return;
         };
-        let started = self.maker.task().and_then(|task| {
-            spawned(&task).map_err(|e| Refusal::unable(format!("the program could not be started: {e}")))
+        let ended = self.maker.task().and_then(|mut command| {
+            let must_stop = || job.stop.load(Ordering::Relaxed);
+            let hear = |event| {
+                self.change(id, |job| job.hear(event));
+            };
+            child::run(&mut command, self.to_stop, must_stop, hear)
+                .map_err(|e| Refusal::unable(format!("the program could not be started: {e}")))
         });
-        let child = match started {
-            Ok(child) => child,
+        match ended {
+            Ok(ended) => {
+                self.maker.ended(ended.code, &ended.output);
+                self.change(id, |job| job.end(&ended));
+                self.tell_project();
+            }
             Err(refusal) => {
                 self.change(id, |job| {
                     if job.state == State::Running {
                         (job.state, job.error) = (State::Error, Some(refusal.to_string()));
                     }
                 });
-                return;
             }
-        };
-        let ended = watch(child, &job.stop, self.to_stop, |line| {
-            self.change(id, |job| job.hear(line));
-        });
-        let Ended { code, output, errors } = ended.await;
-        self.maker.ended(code, &output);
-        self.change(id, |job| job.end(code, &output, errors));
-        self.tell_project();
+        }
     }
 
     fn change(&self, id: u64, change: impl FnOnce(&mut Job)) -> Option<Job> {
@@ -295,106 +293,26 @@ impl Jobs {
 
 impl Job {
     /// Records the end of the process.
-    fn end(&mut self, code: Option<i32>, output: &str, errors: String) {
+    fn end(&mut self, ended: &Ended) {
         if self.state == State::Running {
             self.seconds = self.told().seconds;
-            self.state = match code {
+            self.state = match ended.code {
                 Some(0) => State::Verified,
                 Some(1) => State::Failed,
                 _ => State::Error,
             };
         }
-        (self.exit_code, self.seconds_left) = (code, None);
+        (self.exit_code, self.seconds_left) = (ended.code, None);
         if self.state == State::Error {
-            let told = serde_json::from_str::<Value>(output).ok();
+            let told = serde_json::from_str::<Value>(&ended.output).ok();
             let told = told.and_then(|value| value["error"].as_str().map(str::to_owned));
-            let words = || match errors.trim() {
+            let words = || match ended.errors.join("\n").trim() {
                 "" => "the program ended without a word".to_owned(),
                 errors => errors.to_owned(),
             };
             self.error = Some(told.unwrap_or_else(words));
         }
     }
-}
-
-fn spawned(task: &Task) -> std::io::Result<Child> {
-    Command::new(&task.program)
-        .args(&task.arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .kill_on_drop(true)
-        .spawn()
-}
-
-/// Result of a process that has ended.
-#[derive(Default)]
-struct Ended {
-    /// Exit code; `None` if a signal ended the process.
-    code: Option<i32>,
-    /// Text of its standard output.
-    output: String,
-    /// Lines of its standard error that are no events.
-    errors: String,
-}
-
-/// Waits for the end of `child`, and passes its events to `hear`.
-///
-/// Once `stop` is notified, the standard input of `child` is closed. If `child` has not ended `to_stop`
-/// later, it is killed; a killed process has no output.
-async fn watch(mut child: Child, stop: &Notify, to_stop: Duration, hear: impl FnMut(&str)) -> Ended {
-    let stdin = child.stdin.take();
-    let overdue = async {
-        stop.notified().await;
-        drop(stdin);
-        tokio::time::sleep(to_stop).await;
-    };
-    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
-    let listening = async {
-        let (output, errors) = tokio::join!(printed(stdout), progress(stderr, hear));
-        let status = child.wait().await;
-        Ended {
-            code: status.ok().and_then(|status| status.code()),
-            output,
-            errors,
-        }
-    };
-    // Child processes of a killed one may keep its pipes open, so reading them is abandoned.
-    let ended = tokio::select! {
-        ended = listening => Some(ended),
-        () = overdue => None,
-    };
-    if ended.is_none() {
-        // Killing fails only if the process has just ended.
-        let _ = child.kill().await;
-    }
-    ended.unwrap_or_default()
-}
-
-/// Reads a process's standard output to its end.
-async fn printed(stdout: Option<ChildStdout>) -> String {
-    let mut output = Vec::new();
-    if let Some(mut stdout) = stdout {
-        // A partial answer is no JSON, and is reported as such.
-        let _ = stdout.read_to_end(&mut output).await;
-    }
-    String::from_utf8_lossy(&output).into_owned()
-}
-
-/// Passes events on standard error to `hear`. Returns the other lines.
-async fn progress(stderr: Option<ChildStderr>, mut hear: impl FnMut(&str)) -> String {
-    let mut errors = String::new();
-    let Some(stderr) = stderr else { return errors };
-    let mut lines = BufReader::new(stderr).lines();
-    while let Ok(Some(line)) = lines.next_line().await {
-        if line.starts_with('{') {
-            hear(&line);
-        } else {
-            errors += &line;
-            errors.push('\n');
-        }
-    }
-    errors
 }
 
 #[cfg(test)]
@@ -404,17 +322,12 @@ mod tests {
     #[test]
     fn a_job_hears_its_stage_and_keeps_the_latest_notes() {
         let mut job = Job::new(1);
-        job.hear(
-            r#"{"event":"stage","name":"bodies","n_steps":0,"number":12,"n_stages":19,"seconds_left":7.0}"#,
-        );
-        assert_eq!(
-            (&job.stage[..], job.number, job.n_stages, job.seconds_left),
-            ("bodies", 12, 19, Some(7.0))
-        );
-        job.hear(r#"{"event":"stage","name":"reading","n_steps":0}"#);
-        assert_eq!((&job.stage[..], job.number), ("reading", 12));
-        (0..300).for_each(|i| job.hear(&format!(r#"{{"event":"note","text":"note {i}"}}"#)));
-        job.hear("no JSON");
+        let mut hear = |line: &str| job.hear(serde_json::from_str(line).unwrap());
+        hear(r#"{"event":"stage","name":"bodies","n_steps":0,"number":12,"n_stages":19,"seconds_left":7.0}"#);
+        hear(r#"{"event":"stage","name":"reading","n_steps":0}"#);
+        (0..300).for_each(|i| hear(&format!(r#"{{"event":"note","text":"note {i}"}}"#)));
+        assert_eq!((&job.stage[..], job.number, job.n_stages), ("reading", 12, 19));
+        assert_eq!(job.seconds_left, Some(7.0));
         assert_eq!(
             (job.notes.len(), &job.notes[MOST_NOTES - 1][..]),
             (MOST_NOTES, "note 299")
@@ -426,7 +339,13 @@ mod tests {
         let ended = |code, output: &str, errors: &str| {
             let mut job = Job::new(1);
             job.state = State::Running;
-            job.end(code, output, errors.to_owned());
+            let (output, errors) = (output.to_owned(), vec![errors.to_owned()]);
+            job.end(&Ended {
+                code,
+                output,
+                errors,
+                peak_mb: None,
+            });
             job
         };
         assert_eq!(ended(Some(0), "{}", "").state, State::Verified);
@@ -436,10 +355,13 @@ mod tests {
             (wrong.state, wrong.error.as_deref()),
             (State::Error, Some("too thin"))
         );
-        assert_eq!(ended(None, "", "killed\n").error.as_deref(), Some("killed"));
+        assert_eq!(ended(None, "", "killed").error.as_deref(), Some("killed"));
         let mut stopped = Job::new(1);
         stopped.state = State::Stopped;
-        stopped.end(Some(130), "", String::new());
+        stopped.end(&Ended {
+            code: Some(130),
+            ..Ended::default()
+        });
         assert_eq!((stopped.state, stopped.error), (State::Stopped, None));
     }
 
@@ -449,12 +371,11 @@ mod tests {
 
     #[cfg(unix)]
     impl Maker for Scripts {
-        fn task(&self) -> Result<Task, Refusal> {
+        fn task(&self) -> Result<Command, Refusal> {
             let script = self.0.lock().unwrap().pop_front();
-            Ok(Task {
-                program: "sh".into(),
-                arguments: vec!["-c".into(), script.ok_or_else(Refusal::too_many)?.into()],
-            })
+            let mut command = Command::new("sh");
+            command.arg("-c").arg(script.ok_or_else(Refusal::too_many)?);
+            Ok(command)
         }
 
         fn ended(&self, _: Option<i32>, _: &str) {}

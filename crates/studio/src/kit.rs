@@ -4,16 +4,11 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Component, Path, PathBuf};
 
-use serde_json::{Value, json};
+use shellock_job::files::with_slashes;
 use zip::write::SimpleFileOptions;
 
-use crate::Refusal;
-
-/// Parts of a relative `path` with `/` between them on every system, as files and addresses name it.
-pub fn with_slashes(path: &Path) -> String {
-    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
-    parts.join("/")
-}
+use crate::messages::KitFile;
+use crate::refusal::Refusal;
 
 /// Lists all files below `folder` by their names within it, sorted, with `/` between folders.
 pub fn names(folder: &Path) -> Vec<String> {
@@ -34,13 +29,15 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Lists the files with their sizes, bytes.
-pub fn list(folder: &Path) -> Vec<Value> {
+/// Lists the files with their sizes.
+pub fn list(folder: &Path) -> Vec<KitFile> {
     let size = |name: &String| fs::metadata(folder.join(name)).map_or(0, |m| m.len());
-    let names = names(folder);
+    let names = names(folder).into_iter();
     names
-        .iter()
-        .map(|name| json!({ "name": name, "bytes": size(name) }))
+        .map(|name| KitFile {
+            bytes: size(&name),
+            name,
+        })
         .collect()
 }
 
@@ -129,18 +126,6 @@ mod tests {
             "pieces//../plan.json",
         ] {
             assert!(file(&folder, trick).is_err(), "{trick}");
-        }
-    }
-
-    #[test]
-    fn a_name_has_slashes_between_its_parts_on_every_system() {
-        for parts in [
-            &["plan.json"][..],
-            &["pieces", "piece-1.stl"],
-            &["a", "b c", "ü.3mf"],
-        ] {
-            let path: PathBuf = parts.iter().collect();
-            assert_eq!(with_slashes(&path), parts.join("/"));
         }
     }
 

@@ -4,6 +4,7 @@ use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
+use shellock_job::Failure;
 
 /// Reason why a request was not fulfilled, in words for the user.
 #[derive(Debug, thiserror::Error)]
@@ -71,5 +72,16 @@ impl IntoResponse for Refusal {
             _ => json!({ "error": self.words }),
         };
         (self.status, Json(told)).into_response()
+    }
+}
+
+/// A choice that is refused.
+impl From<Failure> for Refusal {
+    fn from(failure: Failure) -> Self {
+        let words = failure.to_string();
+        match failure {
+            Failure::Unwritable { .. } => Self::unable(words),
+            _ => Self::wrong(words),
+        }
     }
 }

@@ -14,12 +14,16 @@ use axum::routing::{delete, get, post};
 use axum::{Json, Router};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use shellock_job::options::Offer;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::{Stream, StreamExt};
 
+use crate::bench::Bench;
 use crate::guard::{Rate, guard, is_token};
 use crate::jobs::{Event, Job, Jobs};
-use crate::{Address, MOST_BYTES, Refusal, Workshop, kit, page};
+use crate::messages::{Divided, Judgement, Shown};
+use crate::refusal::Refusal;
+use crate::{Address, MOST_BYTES, kit, page};
 
 /// Largest body of requests other than models, bytes: labels of four million triangles.
 const MOST_OTHER_BYTES: usize = 16 << 20;
@@ -29,20 +33,19 @@ const MOST_OTHER_BYTES: usize = 16 << 20;
 pub struct Studio {
     pub address: Arc<Address>,
     pub rate: Arc<Rate>,
-    workshop: Arc<dyn Workshop>,
+    bench: Arc<Bench>,
     jobs: Arc<Jobs>,
 }
 
-type Answer = Result<Json<Value>, Refusal>;
+type Answer<T> = Result<Json<T>, Refusal>;
 
 /// Builds the router with all routes, behind the guard.
-pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
-    let jobs = Jobs::new(Arc::clone(&workshop));
+pub fn app(address: &Address, jobs: Arc<Jobs>, bench: Arc<Bench>) -> Router {
     tokio::spawn(Arc::clone(&jobs).run());
     let studio = Studio {
         address: Arc::new(address.clone()),
         rate: Arc::new(Rate::new()),
-        workshop,
+        bench,
         jobs,
     };
     Router::new()
@@ -74,10 +77,10 @@ pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
 /// Runs slow work on a thread of its own, so that the server stays responsive.
 async fn apart<T: Send + 'static>(
     studio: &Studio,
-    work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
+    work: impl FnOnce(&Bench) -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
-    let workshop = Arc::clone(&studio.workshop);
-    let done = tokio::task::spawn_blocking(move || work(&*workshop)).await;
+    let bench = Arc::clone(&studio.bench);
+    let done = tokio::task::spawn_blocking(move || work(&bench)).await;
     done.unwrap_or_else(|_| {
         Err(Refusal::unable(
             "the program made a mistake there; what you did before is kept",
@@ -88,35 +91,31 @@ async fn apart<T: Send + 'static>(
 /// Runs work as [`apart`] does, then tells all open pages that the project has changed.
 async fn changing<T: Send + 'static>(
     studio: &Studio,
-    work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
+    work: impl FnOnce(&Bench) -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
     let done = apart(studio, work).await?;
     studio.jobs.tell_project();
     Ok(done)
 }
 
-async fn project(State(studio): State<Studio>) -> Answer {
+async fn project(State(studio): State<Studio>) -> Answer<Shown> {
     let jobs = studio.jobs.list();
-    apart(&studio, move |workshop| {
-        let mut project = workshop.project();
-        if let Some(made) = project["kit"].as_object_mut() {
-            made.insert("files".into(), kit::list(&workshop.kit_folder()).into());
-        }
-        project["job"] = json!(jobs.last());
-        project["jobs"] = json!(jobs);
-        Ok(Json(project))
-    })
-    .await
+    let project = apart(&studio, |bench| Ok(bench.project())).await?;
+    Ok(Json(Shown {
+        project,
+        job: jobs.last().cloned(),
+        jobs,
+    }))
 }
 
-async fn options(State(studio): State<Studio>) -> Answer {
-    apart(&studio, |workshop| Ok(Json(workshop.options()))).await
+async fn options(State(studio): State<Studio>) -> Answer<Vec<Offer>> {
+    apart(&studio, |bench| Ok(Json(bench.options()))).await
 }
 
-async fn choose(State(studio): State<Studio>, Json(changes): Json<Map<String, Value>>) -> Answer {
-    changing(&studio, move |workshop| {
-        workshop.choose(&changes)?;
-        Ok(Json(workshop.options()))
+async fn choose(State(studio): State<Studio>, Json(changes): Json<Map<String, Value>>) -> Answer<Vec<Offer>> {
+    changing(&studio, move |bench| {
+        bench.choose(&changes)?;
+        Ok(Json(bench.options()))
     })
     .await
 }
@@ -126,9 +125,9 @@ struct Named {
     name: String,
 }
 
-async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Body) -> Answer {
+async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Body) -> Answer<Shown> {
     let file = kept(&studio, body).await?;
-    changing(&studio, move |workshop| workshop.open(&named.name, file.path())).await?;
+    changing(&studio, move |bench| bench.open_file(&named.name, file.path())).await?;
     project(State(studio)).await
 }
 
@@ -137,7 +136,7 @@ async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Re
     let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be kept: {e}"));
     let mut file = tempfile::Builder::new()
         .prefix(".upload-")
-        .tempfile_in(studio.workshop.folder())
+        .tempfile_in(studio.bench.folder())
         .map_err(unwritable)?;
     let (mut chunks, mut n_bytes) = (body.into_data_stream(), 0);
     while let Some(chunk) = chunks.next().await {
@@ -152,8 +151,8 @@ async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Re
     Ok(file)
 }
 
-async fn open_figure(State(studio): State<Studio>, Json(named): Json<Named>) -> Answer {
-    changing(&studio, move |workshop| workshop.open_figure(&named.name)).await?;
+async fn open_figure(State(studio): State<Studio>, Json(named): Json<Named>) -> Answer<Shown> {
+    changing(&studio, move |bench| bench.open_figure(&named.name)).await?;
     project(State(studio)).await
 }
 
@@ -162,37 +161,35 @@ fn bytes(bytes: Vec<u8>) -> Response {
 }
 
 async fn mesh(State(studio): State<Studio>) -> Result<Response, Refusal> {
-    apart(&studio, |workshop| workshop.mesh()).await.map(bytes)
+    apart(&studio, |bench| bench.mesh()).await.map(bytes)
 }
 
-async fn divide(State(studio): State<Studio>) -> Answer {
-    changing(&studio, |workshop| workshop.divide()).await.map(Json)
+async fn divide(State(studio): State<Studio>) -> Answer<Divided> {
+    changing(&studio, |bench| bench.divide()).await.map(Json)
 }
 
 async fn labels(State(studio): State<Studio>) -> Result<Response, Refusal> {
-    apart(&studio, |workshop| workshop.labels()).await.map(bytes)
+    apart(&studio, |bench| bench.labels()).await.map(bytes)
 }
 
-async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer {
-    changing(&studio, move |workshop| workshop.paint(&body))
-        .await
-        .map(Json)
+async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer<Divided> {
+    changing(&studio, move |bench| bench.paint(&body)).await.map(Json)
 }
 
-async fn judge(State(studio): State<Studio>) -> Answer {
-    apart(&studio, |workshop| workshop.judge()).await.map(Json)
+async fn judge(State(studio): State<Studio>) -> Answer<Judgement> {
+    apart(&studio, |bench| bench.judge()).await.map(Json)
 }
 
 async fn cut(State(studio): State<Studio>) -> Result<Response, Refusal> {
-    apart(&studio, |workshop| workshop.cut()).await.map(bytes)
+    apart(&studio, |bench| bench.cut()).await.map(bytes)
 }
 
-async fn mend(State(studio): State<Studio>) -> Answer {
-    changing(&studio, |workshop| workshop.mend()).await.map(Json)
+async fn mend(State(studio): State<Studio>) -> Answer<Divided> {
+    changing(&studio, |bench| bench.mend()).await.map(Json)
 }
 
-async fn mirror(State(studio): State<Studio>) -> Answer {
-    changing(&studio, |workshop| workshop.mirror()).await.map(Json)
+async fn mirror(State(studio): State<Studio>) -> Answer<Divided> {
+    changing(&studio, |bench| bench.mirror()).await.map(Json)
 }
 
 #[derive(Deserialize)]
@@ -200,20 +197,20 @@ struct Place {
     at: [f64; 3],
 }
 
-async fn place_key(State(studio): State<Studio>, Json(place): Json<Place>) -> Answer {
-    changing(&studio, move |workshop| {
-        workshop.place_key(place.at)?;
-        Ok(Json(workshop.options()))
+async fn place_key(State(studio): State<Studio>, Json(place): Json<Place>) -> Answer<Vec<Offer>> {
+    changing(&studio, move |bench| {
+        bench.place_key(place.at)?;
+        Ok(Json(bench.options()))
     })
     .await
 }
 
-async fn make(State(studio): State<Studio>) -> Result<Json<Job>, Refusal> {
-    apart(&studio, |workshop| workshop.task().map(|_| ())).await?;
+async fn make(State(studio): State<Studio>) -> Answer<Job> {
+    apart(&studio, |bench| bench.can_make()).await?;
     studio.jobs.add().map(Json)
 }
 
-async fn stop(State(studio): State<Studio>, Path(id): Path<u64>) -> Result<Json<Job>, Refusal> {
+async fn stop(State(studio): State<Studio>, Path(id): Path<u64>) -> Answer<Job> {
     studio.jobs.stop(id).map(Json)
 }
 
@@ -229,7 +226,7 @@ async fn events(State(studio): State<Studio>) -> Sse<impl Stream<Item = Result<s
 }
 
 async fn archive(State(studio): State<Studio>) -> Result<Response, Refusal> {
-    let packed = apart(&studio, |workshop| kit::archive(&workshop.kit_folder())).await?;
+    let packed = apart(&studio, |bench| kit::archive(&bench.kit_folder())).await?;
     let headers = [
         (header::CONTENT_TYPE, "application/zip"),
         (header::CONTENT_DISPOSITION, "attachment; filename=\"kit.zip\""),
@@ -245,8 +242,8 @@ async fn kit_file(
         return Err(Refusal::no_token());
     }
     let kind = kit::kind(&name);
-    let read = apart(&studio, move |workshop| {
-        let path = kit::file(&workshop.kit_folder(), &name)?;
+    let read = apart(&studio, move |bench| {
+        let path = kit::file(&bench.kit_folder(), &name)?;
         std::fs::read(path).map_err(|e| Refusal::unable(format!("the file cannot be read: {e}")))
     });
     Ok(([(header::CONTENT_TYPE, kind)], read.await?).into_response())

@@ -21,7 +21,7 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the lowest up, each with those that its library or program may depend on.
-const FLOORS: [(&str, &[&str]); 20] = [
+const FLOORS: [(&str, &[&str]); 21] = [
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
@@ -58,18 +58,30 @@ const FLOORS: [(&str, &[&str]); 20] = [
     ),
     ("print", &["geom", "mechanics", "assembly", "render"]),
     ("kit", &["geom", "assembly", "shellock", "print"]),
-    ("studio", &[]),
+    (
+        "job",
+        &[
+            "geom",
+            "formats",
+            "mechanics",
+            "render",
+            "shellock",
+            "print",
+            "kit",
+        ],
+    ),
+    ("studio", &["geom", "formats", "shellock", "print", "job"]),
     (
         "cli",
         &[
             "geom",
             "formats",
             "mechanics",
-            "assembly",
             "render",
             "shellock",
             "print",
             "kit",
+            "job",
             "studio",
             "volume",
         ],
@@ -261,10 +273,20 @@ fn crates_depend_only_on_lower_floors() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Finds files of `crates` whose text has one of the `forbidden` words.
+fn using(crates: &[&str], forbidden: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for file in crates.iter().flat_map(|krate| sources(krate)) {
+        let text = fs::read_to_string(&file).unwrap();
+        let used = forbidden.iter().filter(|word| text.contains(**word));
+        found.extend(used.map(|word| format!("{} uses {word}", file.display())));
+    }
+    found
+}
+
 #[test]
 fn library_crates_touch_no_file_clock_or_stdout() {
-    let mut found = Vec::new();
-    for krate in [
+    let crates = [
         "geom",
         "formats",
         "mechanics",
@@ -281,22 +303,33 @@ fn library_crates_touch_no_file_clock_or_stdout() {
         "shellock",
         "print",
         "kit",
-    ] {
-        for file in sources(krate) {
-            let text = fs::read_to_string(&file).unwrap();
-            for forbidden in [
-                "std::fs",
-                "Instant::now",
-                "SystemTime",
-                "println!",
-                "eprintln!",
-                "std::env",
-            ] {
-                if text.contains(forbidden) {
-                    found.push(format!("{} uses {forbidden}", file.display()));
-                }
-            }
-        }
-    }
+    ];
+    let forbidden = [
+        "std::fs",
+        "Instant::now",
+        "SystemTime",
+        "println!",
+        "eprintln!",
+        "std::env",
+    ];
+    let found = using(&crates, &forbidden);
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn a_job_reads_no_arguments_prints_nothing_and_does_not_end_the_process() {
+    let forbidden = [
+        "println!",
+        "eprintln!",
+        "std::io::stdin",
+        "std::io::stdout",
+        "std::io::stderr",
+        "env::args",
+        "env::var",
+        "process::exit",
+        "ExitCode",
+        "clap",
+    ];
+    let found = using(&["job"], &forbidden);
     assert!(found.is_empty(), "{found:#?}");
 }

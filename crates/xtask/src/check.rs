@@ -9,7 +9,7 @@ use crate::problem::Problem;
 use crate::{cargo, words};
 
 /// Crates with fast unit tests: 0.01 to 7 s each on one core, 30 s in all. Those of `shellock` take 80 s.
-const FAST: [&str; 16] = [
+const FAST: [&str; 17] = [
     "shellock-geom",
     "shellock-formats",
     "shellock-mechanics",
@@ -21,6 +21,7 @@ const FAST: [&str; 16] = [
     "shellock-plan",
     "shellock-print",
     "shellock-kit",
+    "shellock-job",
     "shellock-studio",
     "shellock-cli",
     "shellock-check",

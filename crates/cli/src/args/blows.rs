@@ -1,18 +1,11 @@
 //! Command-line arguments of `test`.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use shellock_job::options::{Axis, material, units};
+use shellock_job::stress::{self, Place};
 use shellock_mechanics::Material;
 
-use super::Axis;
-use crate::stress;
-use crate::units;
-
-/// Place that the punch presses on.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Place {
-    Top,
-    Middle,
-}
+use super::options::words;
 
 /// Loads that a finished kit is tested with, and settings of the simulation.
 #[derive(Args)]
@@ -23,14 +16,14 @@ pub struct Blows {
     pub punch: f64,
     /// Place that the punch presses on: the highest place 15 mm wide or wider (top), or the highest place
     /// above the middle (middle)
-    #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
+    #[arg(long, value_parser = words::<Place>(), default_value = "top", value_name = "WHERE")]
     pub at: Place,
     /// Height of the fall: m, cm or mm
     #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
           value_parser = units::metres)]
     pub drop: f64,
     /// Material of the pieces: sla-resin, pla, petg or pa12 [default: as the kit was built]
-    #[arg(long, value_name = "NAME", value_parser = stress::material)]
+    #[arg(long, value_name = "NAME", value_parser = material)]
     pub material: Option<Material>,
     /// Edge of the cells that finished pieces are cut into, mm, 0.5 to 20; smaller ones take longer and more
     /// memory
@@ -45,6 +38,20 @@ pub struct Blows {
     #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
     pub edges: f64,
     /// Which axis points up [default: as the kit was built]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = words::<Axis>())]
     pub up: Option<Axis>,
+}
+
+impl From<&Blows> for stress::Blows {
+    fn from(blows: &Blows) -> Self {
+        Self {
+            punch_n: blows.punch,
+            at: blows.at,
+            drop_m: blows.drop,
+            material: blows.material,
+            cell_mm: blows.cell,
+            edge_share: blows.edges,
+            up: blows.up,
+        }
+    }
 }

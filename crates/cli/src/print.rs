@@ -1,0 +1,142 @@
+//! Printing to the terminal: the report on a finished kit, warnings, checks and failures.
+
+use shellock::design::{Design, Settings};
+use shellock::verify::Verification;
+use shellock::verify::words::PlaceWords;
+use shellock::{Warning, play};
+use shellock_job::bears_lines;
+use shellock_job::input::Model;
+use shellock_job::output::{Destination, Summary};
+use shellock_job::place::Standing;
+use shellock_job::printing::Printing;
+use shellock_job::told::{bearing, fits, quality, tried, warning_lines, weakest};
+
+use crate::Session;
+use crate::progress::Shown;
+
+/// A finished kit, with everything that its report needs.
+pub struct Finished<'a> {
+    pub to: &'a Destination,
+    pub made: &'a Design,
+    pub settings: &'a Settings,
+    pub summary: &'a Summary,
+    pub warnings: &'a [Warning],
+    pub standing: &'a Standing,
+    pub printing: &'a Printing,
+}
+
+impl Finished<'_> {
+    /// Prints the whole report for people: figures, warnings, and one verdict at the end.
+    pub fn print(&self, session: &Session) {
+        let (made, standing) = (self.made, self.standing);
+        let verdict = &made.kit.verification;
+        println!(
+            "{} pieces, piece {} is the key; walls {:.1} mm; {:.0} % of the solid model's material",
+            made.kit.pieces.len(),
+            made.kit.plan.key(),
+            made.kit.thickness_mm,
+            100.0 * self.summary.volume_ratio
+        );
+        if verdict.passed() || session.is_verbose {
+            self.print_figures(session);
+        }
+        print_checks(verdict, session.is_verbose);
+        print_warnings(session, self.warnings, standing);
+        if verdict.passed() {
+            println!("{}", self.printing.words());
+            println!(
+                "written to {}: print plates.3mf; report.html shows how it goes together",
+                self.to.folder().display()
+            );
+        } else {
+            println!(
+                "written to {}, to look at: report.html",
+                self.to.folder().display()
+            );
+            print_failures(verdict, standing);
+            eprintln!(
+                "What may help: another number of pieces (--pieces), a larger --size, labels of your own \
+                 (--labels), more --time."
+            );
+        }
+    }
+
+    fn print_figures(&self, session: &Session) {
+        let (made, standing) = (self.made, self.standing);
+        bears_lines(&made.kit.holding, standing)
+            .into_iter()
+            .for_each(|line| println!("{line}"));
+        println!("pieces sit {}", play::words(&made.kit.play));
+        if let Some(line) = fits(made) {
+            println!("{line}");
+        }
+        if !session.is_verbose {
+            return;
+        }
+        if let Some(strength) = &made.strength {
+            println!("{}", bearing(strength, self.settings, standing));
+        }
+        println!("{}", quality(&made.kit.proof));
+        weakest(&made.kit.holding, standing)
+            .into_iter()
+            .for_each(|line| println!("{line}"));
+        println!(
+            "connectors on {:.0} % of the seam length that fits any",
+            100.0 * self.summary.connector_share
+        );
+        println!("{}", tried(&made.effort));
+    }
+}
+
+/// Prints warnings on how the model's file was read, before anything else. They go to standard output, or to
+/// standard error in quiet mode. With JSON they are part of the result instead.
+pub fn print_input_warnings(session: &Session, model: &Model) {
+    for warning in &model.warnings {
+        match session.shown {
+            Shown::ForPeople => println!("{}: {warning}", warning.severity()),
+            Shown::Nothing if !session.is_json => eprintln!("{}: {warning}", warning.severity()),
+            _ => {}
+        }
+    }
+}
+
+/// Prints the [`warning_lines`] on standard output.
+pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standing) {
+    warning_lines(warnings, session.is_verbose, standing)
+        .iter()
+        .for_each(|line| println!("{line}"));
+}
+
+/// Prints every check if `is_verbose`; else those that failed, or a line that says that all passed.
+fn print_checks(verdict: &Verification, is_verbose: bool) {
+    if verdict.passed() && !is_verbose {
+        println!("all {} checks passed", verdict.checks.len());
+        return;
+    }
+    for c in verdict.checks.iter().filter(|c| is_verbose || !c.ok) {
+        println!(
+            "{}  {:52} {}",
+            if c.ok { "ok  " } else { "FAIL" },
+            c.name,
+            c.figure
+        );
+    }
+}
+
+/// Prints every check, and then prominently each failure with its place.
+pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
+    print_checks(verdict, true);
+    print_failures(verdict, words);
+}
+
+/// Prints each failure with its place on standard error, if there is any.
+pub fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
+    if !verdict.passed() {
+        eprintln!(
+            "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
+        );
+        for finding in &verdict.findings {
+            eprintln!("  {}", finding.told(words));
+        }
+    }
+}

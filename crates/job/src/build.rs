@@ -1,0 +1,218 @@
+//! A whole job: from a model and options to the files of a kit.
+
+use shellock::context::Progress;
+use shellock::design::{self, Design, DesignOutcome, Params, Planned, Settings, design};
+use shellock::{Ctx, Warning};
+use shellock_print::Printer;
+
+use crate::Session;
+use crate::bed::{fitted, too_large};
+use crate::clock::{Deadline, PlanClock};
+use crate::failure::Failure;
+use crate::input::{self, Model};
+use crate::options::Options;
+use crate::output::{Summary, files};
+use crate::printing::Printing;
+
+/// Returns the parameters, or all problems with the options in one error.
+pub fn checked(options: &Options) -> Result<Params, Failure> {
+    let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let params = options.params(&printer);
+    let mut problems = params.problems();
+    problems.extend(printer.problems().iter().map(ToString::to_string));
+    for (option, mm) in [("size", options.size), ("height", options.height)] {
+        problems.extend(
+            mm.and_then(|mm| input::length(option, mm).err())
+                .map(|e| e.to_string()),
+        );
+    }
+    // An infinite time is allowed: the search then runs until the proof is closed.
+    if options.time.is_nan() || options.time < 0.0 {
+        problems.push(format!("time is {} s; it must be 0 or more", options.time));
+    }
+    if options.plan_time.is_nan() || options.plan_time < 0.0 {
+        problems.push(format!(
+            "plan time is {} s; it must be 0 or more",
+            options.plan_time
+        ));
+    }
+    if !(0.0..=0.1).contains(&options.resolution) {
+        problems.push(format!(
+            "resolution is {} mm; it must be from 0 to 0.1",
+            options.resolution
+        ));
+    }
+    if problems.is_empty() {
+        Ok(params)
+    } else {
+        Err(Failure::Wrong(problems.join("\nerror: ")))
+    }
+}
+
+/// A kit that is made but not yet written.
+pub struct Made {
+    /// Finished design.
+    pub design: Box<Design>,
+    /// Notes on changes to the model and to the choices.
+    pub notes: Vec<String>,
+    /// Warnings about the kit and its plates.
+    pub warnings: Vec<Warning>,
+    /// Plates of the kit.
+    pub printing: Printing,
+    /// All files of the kit, each with its name in the kit's folder.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Figures of the kit.
+    pub summary: Summary,
+}
+
+impl Made {
+    /// Returns true if every check passes.
+    pub fn passed(&self) -> bool {
+        self.design.kit.verification.passed()
+    }
+}
+
+/// A job whose choices have been adapted to its model and printer.
+pub struct Begun<'a> {
+    model: &'a Model,
+    options: &'a Options,
+    params: Params,
+    printer: Printer,
+    notes: Vec<String>,
+}
+
+impl<'a> Begun<'a> {
+    /// Prepares a job for `model`; fails if it cannot be made.
+    pub fn new(
+        session: &Session,
+        model: &'a Model,
+        options: &'a Options,
+        params: &Params,
+    ) -> Result<Self, Failure> {
+        let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+        let params = fitted(session, params, options, model)?;
+        let settings = Settings::resolve(&params);
+        let mut notes = model.notes.clone();
+        notes.extend(too_large(session, &settings, &printer, model)?);
+        Ok(Self {
+            model,
+            options,
+            params,
+            printer,
+            notes,
+        })
+    }
+
+    /// Notes on changes to the model and to the choices.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Makes the kit and reports progress to `show`.
+    pub fn made(self, session: &Session, show: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Made, Failure> {
+        let (model, options) = (self.model, self.options);
+        let designed = timed(session, options, show, |ctx| {
+            design(ctx, &self.params, &model.solid, model.labels.as_deref())
+        });
+        let design = match designed? {
+            DesignOutcome::Made(made) => made,
+            DesignOutcome::NoPlan {
+                reason,
+                blockers,
+                is_cut_short,
+                ..
+            } => {
+                let told = no_plan(&reason, &blockers);
+                return Err(Failure::NoPlan { told, is_cut_short });
+            }
+        };
+        let mut notes = self.notes;
+        if let Some(asked) = self
+            .params
+            .n_pieces
+            .filter(|asked| design.kit.pieces.len() > asked + 1)
+        {
+            notes.push(format!(
+                "{} pieces instead of {asked}: some were divided until every piece locks",
+                design.kit.pieces.len()
+            ));
+        }
+        show(Progress::Stage {
+            name: "files and pictures",
+            n_steps: 0,
+        });
+        let printing = Printing::of(
+            &self.printer,
+            design.kit.pieces.as_slice(),
+            &design.kit.surface.mesh,
+            &model.solid,
+        );
+        let mut warnings = model.warnings.clone();
+        warnings.extend(design.warnings.iter().cloned());
+        warnings.extend(printing.warnings());
+        let (files, summary) = files(model, options, &design.settings, &design, &warnings, &printing);
+        if session.is_stopped() {
+            return Err(Failure::Stopped);
+        }
+        Ok(Made {
+            design,
+            notes,
+            warnings,
+            printing,
+            files,
+            summary,
+        })
+    }
+}
+
+/// Divides and plans a model as a kit would be, without making it, and reports progress to `show`.
+pub fn planned(
+    session: &Session,
+    model: &Model,
+    options: &Options,
+    params: &Params,
+    show: &(dyn Fn(Progress<'_>) + Sync),
+) -> Result<Planned, Failure> {
+    let planned = timed(session, options, show, |ctx| {
+        design::plan(ctx, params, &model.solid, model.labels.as_deref())
+    });
+    planned?.map_err(|none| Failure::NoPlan {
+        told: format!("no plan was found: {}", none.reason),
+        is_cut_short: none.is_cut_short,
+    })
+}
+
+/// Runs `work` with the time limits that the options set.
+fn timed<T>(
+    session: &Session,
+    options: &Options,
+    show: &(dyn Fn(Progress<'_>) + Sync),
+    work: impl FnOnce(&Ctx<'_>) -> T,
+) -> T {
+    let clock = PlanClock::new(options.plan_time);
+    let report = |p: Progress<'_>| {
+        clock.see(&p);
+        show(p);
+    };
+    let is_time_up = || clock.is_up();
+    let deadline = Deadline::new(options.time, session.since);
+    let seconds_left = || deadline.seconds_left();
+    let ctx = Ctx::new(&report, &session.stop)
+        .with_time_limit(&is_time_up)
+        .with_deadline(&seconds_left);
+    work(&ctx)
+}
+
+fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> String {
+    let mut text = format!("no plan was found: {reason}");
+    for b in blockers {
+        let [x, y, z] = b.at;
+        let share = 100.0 * b.occluded;
+        text += &format!(
+            "\n  piece {} is in the way of piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it hides {share:.0} % \
+             of it",
+            b.by, b.piece
+        );
+    }
+    text
+}

@@ -1,0 +1,259 @@
+//! Lays a kit on the plates of a printer: files, figures, and pieces that do not fit.
+
+use rayon::prelude::*;
+use shellock::{Cause, PatchId, Warning};
+use shellock_formats::{NamedObject, write_3mf};
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::decimate::decimate;
+use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_kit::plan_file::PrintingEntry;
+use shellock_print::load::Load;
+use shellock_print::plates::{Laid, Plates, Printable, lay, lay_alone};
+use shellock_print::time::{Cost, whole, whole_words};
+use shellock_print::{Printer, Process};
+use shellock_render::palette;
+use shellock_render::stills::{Camera, Painted, render};
+
+/// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
+const SKIN_MM: f64 = 0.05;
+
+/// Colour of the plate in pictures.
+const BED: [u8; 3] = [226, 228, 232];
+
+/// A kit laid on plates.
+pub struct Printing {
+    printer: Printer,
+    plates: Plates,
+    /// Cost of all plates, and of the whole model as people print it, by closed forms; `None` if it cannot be
+    /// laid.
+    cost: Cost,
+    whole: Option<Cost>,
+    /// Mass of the pieces without supports, g.
+    grams: f64,
+}
+
+impl Printing {
+    /// Lays `pieces` on plates of `printer`. Faces of theirs on `surface` are the visible skin; `solid` is
+    /// the model.
+    pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
+        let skin = TriangleBvh::new(surface);
+        let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
+        let plates = lay(printer, &printables);
+        let mut loads = vec![Load::default(); plates.n_plates];
+        for laid in &plates.laid {
+            loads[laid.plate] = loads[laid.plate].and(laid.load);
+        }
+        let whole = lay_alone(printer, solid.mesh()).map(|laid| {
+            let load = whole(printer.process, laid.load, solid.mesh().area());
+            Cost::of(printer, &load)
+        });
+        Self {
+            printer: printer.clone(),
+            plates,
+            cost: loads
+                .iter()
+                .fold(Cost::default(), |sum, load| sum.and(Cost::of(printer, load))),
+            whole,
+            grams: pieces.iter().map(TriMesh::signed_volume).sum::<f64>() * printer.material.density_g_cm3
+                / 1000.0,
+        }
+    }
+
+    /// Cost of all plates by closed forms, and of the whole model as people print it.
+    pub fn costs(&self) -> (Cost, Option<Cost>) {
+        (self.cost, self.whole)
+    }
+
+    /// Mass of the pieces without supports, g.
+    pub fn grams(&self) -> f64 {
+        self.grams
+    }
+
+    /// Warns of pieces that are too large for the printer; `None` if all fit.
+    pub fn warnings(&self) -> Option<Warning> {
+        let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| i.into()).collect();
+        (!pieces.is_empty()).then(|| Warning {
+            cause: Cause::PieceTooLarge {
+                printer: described(&self.printer),
+            },
+            pieces,
+            at: None,
+        })
+    }
+
+    /// Describes the plates in one line for people.
+    pub fn words(&self) -> String {
+        let n = self.plates.n_plates;
+        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let supports = match self.printer.process {
+            Process::Sls => String::new(),
+            _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
+        };
+        let rest = match self.plates.too_large.len() {
+            0 => format!("; {}", self.cost_words()),
+            n => format!("; {n} pieces are not on them"),
+        };
+        let plates = if n == 1 { "plate" } else { "plates" };
+        format!(
+            "plates.3mf: {n} {plates} of {}{supports}{rest}",
+            described(&self.printer)
+        )
+    }
+
+    /// Describes the cost, as in "about 13 h 50 min and 104 g on this printer with supports; the whole model
+    /// …".
+    fn cost_words(&self) -> String {
+        let process = self.printer.process;
+        let supports = if process == Process::Sls {
+            ""
+        } else {
+            " with supports"
+        };
+        let ours = format!("about {} on this printer{supports}", self.cost.words());
+        match self.whole {
+            Some(whole) => format!(
+                "{ours}; the whole model {} takes {}",
+                whole_words(process),
+                whole.words()
+            ),
+            None => ours,
+        }
+    }
+
+    /// Printer that the kit is laid out for.
+    pub fn printer(&self) -> &Printer {
+        &self.printer
+    }
+
+    /// Lists the figures of the plates for the page.
+    pub fn figures(&self) -> Vec<(String, String)> {
+        let n = self.plates.n_plates;
+        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let mut figures = vec![
+            ("printer".to_owned(), described(&self.printer)),
+            ("plates".to_owned(), n.to_string()),
+            ("all plates, about".to_owned(), self.cost.words()),
+        ];
+        if let Some(whole) = self.whole {
+            let name = format!("the whole model {}", whole_words(self.printer.process));
+            figures.push((name, whole.words()));
+        }
+        if self.printer.process != Process::Sls {
+            let supports = format!("{:.1} cm² of the outer skin", outer_mm2 / 100.0);
+            figures.push(("supports stand on".to_owned(), supports));
+        }
+        figures
+    }
+
+    /// Renders each plate from above, as PNG.
+    pub fn pictures(&self, pieces: &[TriMesh]) -> Vec<Vec<u8>> {
+        (0..self.plates.n_plates)
+            .into_par_iter()
+            .map(|plate| self.picture(plate, pieces))
+            .collect()
+    }
+
+    fn picture(&self, plate: usize, pieces: &[TriMesh]) -> Vec<u8> {
+        const WIDTH: usize = 640;
+        let [width, depth, _] = self.printer.bed_mm;
+        let laid: Vec<(usize, TriMesh)> = self
+            .plates
+            .laid
+            .iter()
+            .filter(|l| l.plate == plate)
+            .map(|l| (l.piece, as_laid(l, &pieces[l.piece])))
+            .collect();
+        let bed = TriMesh {
+            points: [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]]
+                .map(|[x, y]| Vec3::new(x, y, -0.5))
+                .into(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let painted = |mesh, color| Painted {
+            mesh,
+            color,
+            face_colors: None,
+            normals: None,
+            shift: Vec3::ZERO,
+        };
+        let mut scene = vec![painted(&bed, BED)];
+        scene.extend(
+            laid.iter()
+                .map(|(piece, mesh)| painted(mesh, palette::color(*piece))),
+        );
+        let height = (WIDTH as f64 * (depth / width).clamp(0.3, 3.0)).round() as usize;
+        render(&scene, &Camera::along(-Vec3::Z, Vec3::Y), WIDTH, height).png()
+    }
+
+    /// Entry on printing in plan.json.
+    pub fn entry(&self) -> PrintingEntry {
+        PrintingEntry::of(&self.printer, &self.plates, self.cost, self.whole)
+    }
+
+    /// 3MF files: all plates side by side, and each plate alone if there are several.
+    pub fn files(&self, pieces: &[TriMesh]) -> Vec<(String, Vec<u8>)> {
+        let names: Vec<String> = (1..=pieces.len())
+            .map(|number| format!("piece {number}"))
+            .collect();
+        let object = |laid: &Laid, moved_mm: [f64; 3]| {
+            let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
+            NamedObject {
+                name,
+                color: palette::color(laid.piece),
+                mesh,
+                turned: Some(laid.turned),
+                moved_mm,
+            }
+        };
+        let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {
+            self.plates
+                .laid
+                .iter()
+                .filter(|l| l.plate == plate)
+                .map(|l| object(l, l.moved_mm))
+                .collect()
+        };
+        let all = || {
+            self.plates
+                .laid
+                .iter()
+                .map(|l| object(l, l.moved_among_plates_mm(&self.printer)))
+                .collect()
+        };
+        let n = self.plates.n_plates;
+        let single =
+            (0..if n > 1 { n } else { 0 }).map(|i| (format!("plates/plate-{}.3mf", i + 1), of_plate(i)));
+        let archives: Vec<(String, Vec<NamedObject<'_>>)> = std::iter::once(("plates.3mf".to_owned(), all()))
+            .chain(single)
+            .collect();
+        archives
+            .into_par_iter()
+            .map(|(name, objects)| (name, write_3mf(&objects)))
+            .collect()
+    }
+}
+
+/// Piece in its pose on the plate, coarse enough for a picture.
+fn as_laid(laid: &Laid, piece: &TriMesh) -> TriMesh {
+    const SEEN_MM: f64 = 0.15;
+    let coarse = decimate(piece.clone(), &vec![SEEN_MM; piece.points.len()]);
+    TriMesh {
+        points: coarse.points.iter().map(|&p| laid.place(p)).collect(),
+        triangles: coarse.triangles,
+    }
+}
+
+/// Marks the faces of a piece that lie on the model's surface.
+fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
+    let is_outer = |f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
+    Printable {
+        mesh,
+        is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect(),
+    }
+}
+
+/// Name and size of a printer, in words.
+pub fn described(printer: &Printer) -> String {
+    let [width, depth, height] = printer.bed_mm;
+    format!("\"{}\" ({width} × {depth} × {height} mm)", printer.name)
+}

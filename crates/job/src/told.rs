@@ -1,0 +1,181 @@
+//! Sentences on a finished kit for people.
+
+use shellock::design::{Design, Effort, Settings};
+use shellock::metric::Holding;
+use shellock::plan::key::KeyDirections;
+use shellock::plan::{PlanProof, ProofScope};
+use shellock::strength::{Strength, StrengthParams};
+use shellock::{Severity, Warning};
+
+use crate::place::Standing;
+
+/// Number of warnings and notes that the short report shows; it shows all problems.
+const MOST_TOLD: usize = 5;
+
+/// Lists what was tried, in order.
+pub fn tried(effort: &Effort) -> String {
+    let mut text = format!(
+        "tried: {} keys, {} divisions, {} plans, {} kits",
+        effort.keys, effort.segmentations, effort.plans, effort.kits
+    );
+    for (i, step) in effort.steps.iter().enumerate() {
+        text += &format!("\n  {}. {step}", i + 1);
+    }
+    text
+}
+
+/// Describes the wall's stress in a fall.
+pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) -> String {
+    let StrengthParams { drop_m, material, .. } = &settings.strength;
+    let hollow = 100.0 * (1.0 - strength.solid_share());
+    // Where little is hollow, the stress was computed on little of the surface.
+    let judged = if hollow < 80.0 {
+        format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
+    } else {
+        String::new()
+    };
+    format!(
+        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the \
+         material bears ({})",
+        strength.stress_mpa,
+        material.strength_mpa,
+        standing.words(strength.at.to_array())
+    )
+}
+
+/// Describes the quality of a plan: its cost, and the bounds that are proven.
+pub fn quality(proof: &PlanProof) -> String {
+    let PlanProof {
+        cost,
+        lower_bound,
+        gap,
+        least_cost,
+        key_lower_bound,
+        ..
+    } = proof;
+    let scope = scope(proof);
+    // A bound that reaches the least known cost is a proof; any remaining difference is rounding.
+    let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
+    let chosen = match least_cost < cost {
+        true => {
+            format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is")
+        }
+        false => format!("{cost:.3},"),
+    };
+    if is_met(lower_bound) {
+        return format!("plan: its worst piece costs {chosen} proven to be the least with {scope}");
+    }
+    let of_key = if is_met(key_lower_bound) {
+        " the least with its key;"
+    } else {
+        " not proven to be the least;"
+    };
+    let percent = 100.0 * gap;
+    format!(
+        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} \
+         ({percent:.1} % below)"
+    )
+}
+
+/// Describes the set of plans that a proof covers.
+pub fn scope(proof: &PlanProof) -> String {
+    let ProofScope {
+        keys,
+        slides,
+        n_lessons,
+    } = &proof.proven_for;
+    let who = match &keys[..] {
+        [key] => format!("piece {key} as the key"),
+        all if all.len() == proof.piece_costs.len() => "any piece as the key".into(),
+        some => {
+            let mut names: Vec<String> = some.iter().map(ToString::to_string).collect();
+            let last = names.pop().unwrap_or_default();
+            format!("piece {} or {last} as the key", names.join(", "))
+        }
+    };
+    let how = match slides {
+        KeyDirections::WithinPlane => "within its plane",
+        KeyDirections::OutOfPlane => "out of its plane",
+    };
+    let lessons = match n_lessons {
+        0 => String::new(),
+        1 => ", and what one lesson of failed kits leaves".into(),
+        n => format!(", and what {n} lessons of failed kits leave"),
+    };
+    format!("{who}, sliding {how}{lessons}")
+}
+
+/// Describes the weakest places of a plan: its weakest seam, and each piece that comes apart.
+pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
+    let seam = holding.seams.first().map(|s| {
+        let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
+        let at = standing.words(s.at);
+        format!(
+            "weakest seam ({at}): pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m: {}",
+            s.reason
+        )
+    });
+    let loose = holding.loose.iter().map(|l| {
+        format!(
+            "comes apart at 10 N/m: piece {}, {}",
+            l.piece,
+            standing.words(l.at)
+        )
+    });
+    seam.into_iter().chain(loose).collect()
+}
+
+/// Describes the precision that a printer needs; `None` if surfaces cross, which has its own warning.
+pub fn fits(made: &Design) -> Option<String> {
+    let within_mm = made.fit.within_mm.filter(|mm| *mm > 0.0)?;
+    let least_mm = 2.0 * within_mm;
+    let as_drawn = |piece| made.kit.play.estimates[piece].map_or(f64::INFINITY, |play| play.translation_mm);
+    let thin = match made.fit.loosest {
+        Some((piece, play)) if play.translation_mm.is_finite() => format!(
+            "; where all stand back by as much, piece {piece} rattles about {:.1} mm instead of {:.1} mm",
+            play.translation_mm,
+            as_drawn(piece)
+        ),
+        Some((piece, _)) => format!("; where all stand back by as much, piece {piece} comes loose"),
+        None => String::new(),
+    };
+    Some(format!(
+        "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is \
+         {least_mm:.2} mm){thin}"
+    ))
+}
+
+/// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
+pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
+    let ranked = Warning::ranked(warnings);
+    let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
+    let n_told = if is_verbose {
+        ranked.len()
+    } else {
+        n_problems.max(MOST_TOLD).min(ranked.len())
+    };
+    let line = |w: &Warning| {
+        let place =
+            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
+        format!("{}: {w}{place}", w.severity())
+    };
+    let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
+    let n_notes = ranked[n_told..]
+        .iter()
+        .filter(|w| w.severity() == Severity::Note)
+        .count();
+    let counted = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {what}")),
+        n => Some(format!("{n} {what}s")),
+    };
+    let rest = [
+        counted(ranked.len() - n_told - n_notes, "warning"),
+        counted(n_notes, "note"),
+    ];
+    let rest: Vec<String> = rest.into_iter().flatten().collect();
+    if !rest.is_empty() {
+        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
+    }
+    lines
+}
