@@ -15,6 +15,9 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use bounded::bounded;
+pub use bounded::{BearingPoint, Bounded};
+use proof::{Proof, Question, prove};
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
@@ -26,9 +29,6 @@ use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
 use crate::verify::{Finding, Play, Verification};
 use crate::{IdVec, PatchId};
-use bounded::bounded;
-pub use bounded::{BearingPoint, Bounded};
-use proof::{Proof, Question, prove};
 
 /// Value of [`Certificate::format`] that marks a certificate.
 pub const FORMAT: &str = "shellock-certificate";

@@ -29,25 +29,21 @@
 //! # Ok::<(), shellock_assembly::Cancelled>(())
 //! ```
 
+mod causes;
 pub mod certificate;
-pub mod context;
 pub mod direction;
-pub mod ids;
 pub mod motion;
-pub mod params;
 pub mod play;
 pub mod press_fit;
 pub mod push;
 pub mod sequence;
 mod verdict;
 pub mod verify;
-pub mod warning;
 
-pub use context::{Cancelled, Ctx};
+pub use causes::{Cause, EstimatedPlay};
 pub use direction::{Direction, LatticeDirection};
-pub use ids::{IdVec, PatchId};
 pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};
+pub use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
 pub use verdict::{Verdict, verify};
 pub use verify::{Assembly, VerifyParams};
-pub use warning::{Cause, Severity, Warning};

@@ -16,14 +16,14 @@ mod play;
 mod system;
 
 use nalgebra::DVector;
+pub(crate) use play::{Corner, Limits};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::Vec3;
+pub(crate) use system::{Row, System};
 
 use crate::PatchId;
-pub(crate) use play::{Corner, Limits};
-pub(crate) use system::{Row, System};
 
 /// Point of piece `a` that piece `b` lies against.
 #[derive(Clone, Copy, Debug)]
@@ -198,8 +198,9 @@ fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<D
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
+
+    use super::*;
 
     fn random_contacts(rng: &mut ChaCha8Rng, n_pieces: u32, n: usize) -> Vec<Contact> {
         let mut unit = || Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;

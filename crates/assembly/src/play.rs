@@ -26,20 +26,21 @@ mod way_out;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rayon::prelude::*;
-use shellock_geom::{TriMesh, Vec3};
-
-use crate::InstallationPlan;
-use crate::motion::{LOOSE, most_play};
-use crate::verify::{Check, Finding, Play};
-use crate::warning::EstimatedPlay;
-use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub use bearing::Bearing;
 use bearing::Surfaces;
 use bound::{Answer, Candidates, Problem};
 pub use bound::{Multipliers, Proof, Slide};
 pub use quantity::Quantity;
+use rayon::prelude::*;
+use shellock_geom::{TriMesh, Vec3};
+use shellock_report::Warning;
 use way_out::Walk;
+
+use crate::InstallationPlan;
+use crate::causes::{Cause, EstimatedPlay};
+use crate::motion::{LOOSE, most_play};
+use crate::verify::{Check, Finding, Play};
+use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Distance that the key may slide on its way out within the proofs, mm: friction, ribs or a detent hold it
 /// closer.
@@ -396,16 +397,16 @@ pub fn check(play: &KitPlay, rattles: &[Rattle]) -> (Check, Vec<Finding>) {
 pub fn warning_of_rattles(rattles: &[Rattle]) -> Option<Warning> {
     let told: Vec<&Rattle> = rattles.iter().filter(|r| r.excess <= LOOSE).collect();
     let loosest = told.first()?;
-    Some(Warning {
-        cause: Cause::Rattles {
+    Some(Warning::new(
+        Cause::Rattles {
             loosest: EstimatedPlay {
                 translation_mm: loosest.play.translation_mm,
                 rotation_deg: loosest.play.rotation_deg,
             },
         },
-        pieces: told.iter().map(|r| r.piece).collect(),
-        at: Some(loosest.at),
-    })
+        told.iter().map(|r| r.piece).collect(),
+        Some(loosest.at),
+    ))
 }
 
 /// Checks that no piece but the key was found to come out by hand; `None` if no search was made.
@@ -446,13 +447,15 @@ pub fn warning(play: &KitPlay) -> Option<Warning> {
         translation_mm: o.1.translation_mm,
         rotation_deg: o.1.rotation_deg,
     };
-    (!open.is_empty()).then(|| Warning {
-        cause: Cause::NotProven {
-            figures: open.iter().map(figure).collect(),
-            is_searched,
-        },
-        pieces: open.iter().map(|o| o.0).collect(),
-        at: None,
+    (!open.is_empty()).then(|| {
+        Warning::new(
+            Cause::NotProven {
+                figures: open.iter().map(figure).collect(),
+                is_searched,
+            },
+            open.iter().map(|o| o.0).collect(),
+            None,
+        )
     })
 }
 

@@ -25,15 +25,15 @@ mod tests;
 mod thin;
 pub mod words;
 
+use contact::Contact;
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
+pub use thin::{ThinFeature, ThinKind, ThinPoint, ThinShare, thin_places, thin_points, thin_share};
 
 use crate::InstallationPlan;
 use crate::PressFit;
 use crate::motion::{self, Freedom, Twist};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
-use contact::Contact;
-pub use thin::{ThinFeature, ThinKind, ThinPoint, ThinShare, thin_places, thin_points, thin_share};
 
 /// Parameters for judging the finished kit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -75,7 +75,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let plan = InstallationPlan {
         steps: steps.collect(),
     };
-    let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
+    let (report, stop) = (|_: shellock::Progress<'_>| {}, AtomicBool::new(false));
     let model = Solid::new(brick(ALL, ALL, ALL).to_mesh()).unwrap();
     let params = VerifyParams {
         clearance_mm: CLEARANCE_MM,

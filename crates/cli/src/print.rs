@@ -102,7 +102,7 @@ pub fn print_input_warnings(session: &Session, model: &Model) {
 
 /// Prints the [`warning_lines`] on standard output.
 pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standing) {
-    warning_lines(warnings, session.is_verbose, standing)
+    warning_lines(warnings, session.is_verbose, standing, |name| format!("--{name}"))
         .iter()
         .for_each(|line| println!("{line}"));
 }

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use shellock::context::Progress;
+use shellock::Progress;
 use shellock_job::child::Event;
 use shellock_job::course::{Course, Stand};
 use shellock_job::stopwatch::{StageTime, Stopwatch};

@@ -495,7 +495,7 @@ fn a_model_too_thin_to_be_hollow_is_refused_at_once_with_what_would_do() {
     let o = shellock(dir.path(), &["build", "plate.stl", "-o", "kit"]);
     let said = String::from_utf8_lossy(&o.stderr).into_owned();
     assert_eq!(o.status.code(), Some(2), "{said}");
-    for word in ["too thin to be hollow", "--size", "--thickness", "--allow-thin"] {
+    for word in ["too thin to be hollow", "mm large", "mm thin", "allow-thin"] {
         assert!(said.contains(word), "{word}: {said}");
     }
     assert!(!dir.path().join("kit").exists());

@@ -4,5 +4,8 @@
 //! borders and repairs patches that no piece can be made of. [`key`] finds a place where the last piece can
 //! slide out and makes it a patch of its own.
 
+mod causes;
 pub mod key;
 pub mod segmentation;
+
+pub use causes::Cause;

@@ -1,10 +1,10 @@
 //! Loads that a kit can take, in words for the person who makes it.
 
 use shellock::handling::{DROP_MM, Deed, Failure};
+pub use shellock::metric::BY_SIMULATION;
 use shellock::metric::{Bears, GivesWay, Holding, LoadBorne, MOST_TIMES, Told};
 
 use crate::place::Standing;
-pub use shellock::metric::BY_SIMULATION;
 
 /// Weight of one kilogram, N.
 const N_PER_KG: f64 = 9.80665;

@@ -44,7 +44,7 @@ impl<'a> Fitting<'a> {
 
     /// Counts the pieces, and those of them that do not fit.
     fn misfits(&self, n_pieces: Option<usize>, labels: Option<&[i64]>) -> Result<(usize, usize), Failure> {
-        let silent = |_: shellock::context::Progress<'_>| ();
+        let silent = |_: shellock::Progress<'_>| ();
         let ctx = Ctx::new(&silent, &self.session.stop);
         let params = SegmentationParams {
             n_pieces,

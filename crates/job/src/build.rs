@@ -1,6 +1,6 @@
 //! A whole job: from a model and options to the files of a kit.
 
-use shellock::context::Progress;
+use shellock::Progress;
 use shellock::design::{self, Design, DesignOutcome, Params, Planned, Settings, design};
 use shellock::{Ctx, Warning};
 use shellock_print::Printer;

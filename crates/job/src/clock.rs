@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use shellock::context::Progress;
+use shellock::Progress;
 
 /// Time by which the whole job should be done.
 pub struct Deadline(Option<Instant>);

@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use shellock::context::Progress;
+use shellock::Progress;
 use shellock::{Ctx, Warning};
 use shellock_formats::{read_selected, write_ply};
 use shellock_geom::TriMesh;

@@ -13,15 +13,14 @@ use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selecte
 use shellock_geom::repair::{InsideOut, Repair, RepairMode, Repaired, repair_as};
 use shellock_geom::simplify::simplify;
 use shellock_geom::{Solid, Vec3};
+use size::{DEFAULT_SIZE_MM, check_size, scale};
+pub use size::{is_usual, length};
 
 use crate::Session;
 use crate::failure::Failure;
 use crate::names::no_such;
 use crate::options::{LabelsFrom, Options};
 use crate::shape::settle_hollow;
-
-use size::{DEFAULT_SIZE_MM, check_size, scale};
-pub use size::{is_usual, length};
 
 /// Size limit of input files, bytes; files are read into memory whole.
 const MAX_FILE_BYTES: u64 = 2 << 30;

@@ -14,6 +14,7 @@ pub mod batch;
 mod bears;
 pub mod bed;
 pub mod build;
+mod causes;
 pub mod child;
 pub mod clock;
 pub mod config;

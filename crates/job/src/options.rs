@@ -12,15 +12,14 @@ mod values;
 
 use std::path::PathBuf;
 
+pub use choices::{Choice, Choices, Offer, changed, offers, relabelled};
+pub use pieces::{Key, Pieces};
 use shellock::connector::ConnectorParams;
 use shellock::design::{self, KeySource, Params};
 use shellock::segmentation::{KeepWhole, Method};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
-
-pub use choices::{Choice, Choices, Offer, changed, offers, relabelled};
-pub use pieces::{Key, Pieces};
 pub use table::{DECLARED, Declared, Kind, declared};
 use values::label;
 pub use values::{

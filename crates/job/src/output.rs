@@ -4,7 +4,6 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::files::with_slashes;
 use rayon::prelude::*;
 use shellock::Warning;
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
@@ -19,6 +18,7 @@ use shellock_render::palette;
 
 use crate::failure::Failure;
 use crate::files::Writing;
+use crate::files::with_slashes;
 use crate::input::{Model, sha256};
 use crate::options::{Axis, Options};
 use crate::page;

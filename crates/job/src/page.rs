@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use shellock::design::{Design, Kit, Settings};
 use shellock::verify::{Check, Finding, Play};
-use shellock::{Cause, IdVec, PatchId, Warning};
+use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::booklet::{Booklet, Borne, WeakPlace, looks};
@@ -15,6 +15,7 @@ use shellock_render::{
 };
 
 use crate::bears;
+use crate::causes::Cause;
 use crate::input::Model;
 use crate::loads;
 use crate::options::Options;
@@ -44,7 +45,7 @@ pub fn report(
     let failed = failed.map(|finding| failure(finding, &standing));
     let warnings: Vec<Warning> = failed
         .chain(warnings.iter().cloned())
-        .map(|w| w.turned(|at| stand(Vec3::from_array(at)).to_array()))
+        .map(|w| w.move_by(|at| stand(Vec3::from_array(at)).to_array()))
         .collect();
     let pieces = pieces(design, &shown, stand);
     let facts = kit_facts(&shown, settings, design, summary, &standing);
@@ -200,13 +201,13 @@ fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Bor
 
 /// Turns a failed check into an entry of the list of warnings.
 fn failure(finding: &Finding, standing: &Standing) -> Warning {
-    Warning {
-        cause: Cause::Failed {
+    Warning::new(
+        Cause::Failed {
             finding: finding.told(standing),
         },
-        pieces: Vec::new(),
-        at: finding.place(),
-    }
+        Vec::new(),
+        finding.place(),
+    )
 }
 
 /// Upright pieces, simplified to a tolerance that the eye cannot see.

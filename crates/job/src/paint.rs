@@ -59,10 +59,11 @@ fn shared_colors(surface: &SegmentedSurface) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock::PatchId;
     use shellock_formats::read_mesh;
     use shellock_geom::{TriMesh, Vec3};
+
+    use super::*;
 
     /// A strip of quads, each its own patch.
     fn strip(n_patches: usize) -> SegmentedSurface {

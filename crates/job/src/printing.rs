@@ -1,7 +1,7 @@
 //! Lays a kit on the plates of a printer: files, figures, and pieces that do not fit.
 
 use rayon::prelude::*;
-use shellock::{Cause, PatchId, Warning};
+use shellock::{PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::decimate::decimate;
@@ -13,6 +13,8 @@ use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
 use shellock_render::stills::{Camera, Painted, render};
+
+use crate::causes::Cause;
 
 /// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
 const SKIN_MM: f64 = 0.05;
@@ -72,12 +74,14 @@ impl Printing {
     /// Warns of pieces that are too large for the printer; `None` if all fit.
     pub fn warnings(&self) -> Option<Warning> {
         let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| i.into()).collect();
-        (!pieces.is_empty()).then(|| Warning {
-            cause: Cause::PieceTooLarge {
-                printer: described(&self.printer),
-            },
-            pieces,
-            at: None,
+        (!pieces.is_empty()).then(|| {
+            Warning::new(
+                Cause::PieceTooLarge {
+                    printer: described(&self.printer),
+                },
+                pieces,
+                None,
+            )
         })
     }
 

@@ -17,9 +17,10 @@
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
-use crate::options::Choice;
 use serde::Deserialize;
 use toml_edit::{DocumentMut, Item, Table, Value, value};
+
+use crate::options::Choice;
 
 /// Ending of a project file's name.
 pub const SUFFIX: &str = ".shellock.toml";

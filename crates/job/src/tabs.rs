@@ -3,12 +3,12 @@
 
 use shellock::PatchId;
 use shellock_geom::TriMesh;
+use shellock_kit::plan_file::piece_file;
 use shellock_print::booklet::Section;
 use shellock_print::{Printer, Process};
 use shellock_render::{ReportPart, ReportTab};
 
 use crate::printing::Printing;
-use shellock_kit::plan_file::piece_file;
 
 /// Tab of the page on printing.
 pub fn print(printing: &Printing, pieces: &[TriMesh], has_booklet: bool) -> ReportTab {

@@ -5,7 +5,7 @@ use shellock::metric::Holding;
 use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
-use shellock::{Severity, Warning};
+use shellock::{Severity, Warning, WarningEntry};
 
 use crate::place::Standing;
 
@@ -146,7 +146,13 @@ pub fn fits(made: &Design) -> Option<String> {
 }
 
 /// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
-pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
+/// `spell` writes a setting as the interface calls it.
+pub fn warning_lines(
+    warnings: &[Warning],
+    is_verbose: bool,
+    standing: &Standing,
+    spell: impl Fn(&str) -> String,
+) -> Vec<String> {
     let ranked = Warning::ranked(warnings);
     let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
     let n_told = if is_verbose {
@@ -157,7 +163,8 @@ pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing
     let line = |w: &Warning| {
         let place =
             w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
-        format!("{}: {w}{place}", w.severity())
+        let sentence = WarningEntry::from(w.clone()).sentence_with(&spell);
+        format!("{}: {sentence}{place}", w.severity())
     };
     let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
     let n_notes = ranked[n_told..]

@@ -17,8 +17,9 @@ use serde_json::Value;
 use shellock::design::Effort;
 use shellock::metric::{Bears, Holding};
 use shellock::plan::PlanProof;
-use shellock_assembly::warning::WarningEntry;
-use shellock_assembly::{PatchId, PressFit};
+use shellock_assembly::PressFit;
+use shellock_report::PatchId;
+use shellock_report::WarningEntry;
 
 pub use entries::{
     ContactEntry, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, LoosestEntry, PairSizeEntry,

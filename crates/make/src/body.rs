@@ -34,7 +34,7 @@ pub use error::BodyError;
 pub(crate) use grid::outward;
 pub use grid::{GridError, LocalField, PatchDistances, ShellGrid};
 pub use separate::{ShellBodies, build};
-use shellock_assembly::params::ParamProblem;
+use shellock_report::ParamProblem;
 
 /// Parameters of making and cutting the wall. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]

@@ -31,8 +31,8 @@ pub use free::is_unobstructed;
 pub use profile::{Part, Section};
 pub(crate) use rail::{rail_places, stop_mm};
 pub use run::{RailPart, Run, RunShape, RunStation, SeamRoom, runs};
-use shellock_assembly::params::ParamProblem;
 use shellock_plan::sizes::SizeChoice;
+use shellock_report::ParamProblem;
 
 /// Parameters of connectors. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,13 +97,7 @@ impl ConnectorParams {
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
             ParamProblem::unless_within("detent", "mm", self.detent_mm, 0.0, 0.4),
-            ParamProblem::unless_within(
-                "press of the key's ribs (--key-ribs)",
-                "mm",
-                self.key_rib_mm,
-                0.0,
-                0.3,
-            ),
+            ParamProblem::unless_within("press of the key's ribs", "mm", self.key_rib_mm, 0.0, 0.3),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
         self.size

@@ -25,9 +25,9 @@ mod engraving;
 mod tests;
 
 use engraving::Sheet;
-use shellock_assembly::PatchId;
 use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+use shellock_report::PatchId;
 
 use crate::connector::{ConnectorParams, RailPart, Run, RunShape, RunStation, Section, rail_places, stop_mm};
 use crate::piece::whole_halves;

@@ -4,6 +4,9 @@
 //! and [`piece`] makes the finished meshes. [`coupon`] makes a pair of small pieces to test the fit.
 
 pub mod body;
+mod causes;
 pub mod connector;
 pub mod coupon;
 pub mod piece;
+
+pub use causes::Cause;

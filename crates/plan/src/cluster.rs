@@ -9,7 +9,8 @@
 //! Reversing `d` reverses every arc, so one of ±d is enough. Along a `d` that is no piece's direction, all
 //! joints hold both ways, and the graph is connected if it is along any other.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::PieceSet;
 

@@ -1,6 +1,7 @@
 //! Diagnosis of why there is no plan.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::space::Space;
 use super::{Blocker, PieceSet, PlanOutcome};

@@ -6,7 +6,8 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::cluster::{DirectedJoint, loose_part_fused};
 use super::key::KeyChoice;

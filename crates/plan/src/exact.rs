@@ -25,7 +25,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sequence::{Sequence, sequence};
-use shellock_assembly::{Cancelled, Ctx, PatchId};
+use shellock_report::{Cancelled, Ctx, PatchId};
 
 use super::draw::Draws;
 use super::improve::improve;

@@ -1,7 +1,8 @@
 //! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.2), then for
 //! all others. The last step may lower the mean if the worst piece cannot be improved.
 
-use shellock_assembly::{IdVec, LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::{IdVec, PatchId};
 
 use super::key::KeyChoice;
 use super::local_cost::{Role, Surroundings, mask_of};

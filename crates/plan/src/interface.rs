@@ -24,9 +24,10 @@ pub use blocking::{BlockingTable, Pushes};
 use obstruction::Obstructions;
 use rayon::prelude::*;
 use sample::{Line, Way, lines};
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
 use shellock_mechanics::{Joint as MechanicalJoint, Meeting, Side, Station};
+use shellock_report::PatchId;
 use shellock_surface::seam::rules::{
     COUNTED_RUN_SIZES, MAX_ALONG_SEAM, MAX_BACKWARD_RAD, MAX_OUT_OF_RAIL, SHORTEST_RUN_SIZES,
 };

@@ -4,8 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{IdVec, LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_report::{IdVec, PatchId};
 use shellock_surface::SegmentedSurface;
 use shellock_surface::plane::{Plane, Spot};
 

@@ -10,6 +10,7 @@
 
 #[cfg(test)]
 mod bound_tests;
+mod causes;
 pub mod cluster;
 mod diagnose;
 mod draw;
@@ -35,6 +36,7 @@ pub mod study;
 mod survey;
 pub mod types;
 
+pub use causes::{Cause, SizeLimit};
 pub use local_cost::{PieceCosts, SeamCosts};
 pub use neighbours::{Neighbourhood, PlanName};
 pub use params::PlanParams;

@@ -13,8 +13,9 @@
 //! remain in its way. The search asks for bounds while several states are still possible. Once a single state
 //! is left, the bound is the cost.
 
+use shellock_assembly::LatticeDirection;
 use shellock_assembly::push::N_PUSHES;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_report::PatchId;
 
 use super::score::{ASKED_MM3, FIRM_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::key::{KeyChoice, choices};
 use super::score::just_above;

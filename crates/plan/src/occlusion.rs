@@ -20,9 +20,10 @@
 mod along_surface;
 
 use rayon::prelude::*;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
 use shellock_geom::topology::Topology;
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 /// Pixels along the longest edge of the surface's bounding box: 0.6 mm at 150 mm.

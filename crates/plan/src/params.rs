@@ -1,8 +1,9 @@
 //! Parameters of planning that the user may set.
 
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_report::PatchId;
 
 /// Parameters by which plans are judged and searched. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! Small sets of pieces as bits, so that the search and the cluster test run in microseconds.
 
-use shellock_assembly::PatchId;
+use shellock_report::PatchId;
 
 /// A set of up to [`PieceSet::MAX_PIECES`] pieces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,7 +7,7 @@
 //! [`interface`](super::interface). The cost of a plan is the pure bottleneck, so that bounds can be proved.
 //! The mean decides between plans with the same bottleneck.
 
-use shellock_assembly::{IdVec, PatchId};
+use shellock_report::{IdVec, PatchId};
 
 use super::space::Space;
 use super::{LatticePlan, PlanConstraints, PlanSurvey};
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
-        let ctx = shellock_assembly::Ctx::quiet();
+        let ctx = shellock_report::Ctx::quiet();
         let survey = survey(
             &ctx,
             &PlanParams::default(),
@@ -175,7 +175,7 @@ mod tests {
     /// `s`.
     fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
-        let ctx = shellock_assembly::Ctx::quiet();
+        let ctx = shellock_report::Ctx::quiet();
         let survey = survey(
             &ctx,
             &PlanParams::default(),

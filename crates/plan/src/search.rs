@@ -11,10 +11,11 @@
 //! Deviation: the paper prunes by the best score so far, which would let threads influence each other. Here
 //! the bound is the best score of the batches before.
 
+use crate::causes::Cause;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Cause, Ctx, PatchId, Warning};
+use shellock_report::{Cancelled, Ctx, PatchId, Warning};
 use shellock_surface::seam::rules::COUNTED_RUN_SIZES;
 
 use super::draw::{DrawLimits, Drawn, Draws, draw};
@@ -142,11 +143,11 @@ fn with_any_tolerance(
 }
 
 fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
-    ctx.warn(Warning {
-        cause: Cause::ShortJoints { from_mm: shortest_mm },
-        pieces: Vec::new(),
-        at: None,
-    });
+    ctx.warn(Warning::new(
+        Cause::ShortJoints { from_mm: shortest_mm },
+        Vec::new(),
+        None,
+    ));
 }
 
 fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
@@ -163,11 +164,11 @@ fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
 }
 
 fn warn_of_tolerance(ctx: &Ctx<'_>, tolerance: f64) {
-    ctx.warn(Warning {
-        cause: Cause::OcclusionToleranceRaised { share: tolerance },
-        pieces: Vec::new(),
-        at: None,
-    });
+    ctx.warn(Warning::new(
+        Cause::OcclusionToleranceRaised { share: tolerance },
+        Vec::new(),
+        None,
+    ));
 }
 
 /// Best plan with a key as good as the first that has any plan; else the smallest set of pieces at which the

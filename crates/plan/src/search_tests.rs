@@ -2,8 +2,9 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shellock_assembly::{Ctx, IdVec, LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_report::{Ctx, IdVec, PatchId};
 use shellock_test_surfaces::{label, seams, sphere, voronoi};
 
 use super::exact::{Budget, Candidate, lower_bound, prove};

@@ -28,14 +28,15 @@
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
+use crate::causes::Cause;
+use crate::causes::SizeLimit;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use shellock_assembly::params::ParamProblem;
-use shellock_assembly::warning::SizeLimit;
-use shellock_assembly::{Cancelled, Cause, Ctx, PatchId, Warning};
 use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_mechanics::connector::CHANNEL_DEPTH;
+use shellock_report::ParamProblem;
+use shellock_report::{Cancelled, Ctx, PatchId, Warning};
 use shellock_surface::{Seam, SegmentedSurface};
 
 /// Length of a seam, in connector sizes, with room for a run of 2.5 between the gaps of 1.5 at its ends.
@@ -460,15 +461,15 @@ impl ChosenSizes {
     /// are too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
         for raised in &self.raised {
-            ctx.warn(Warning {
-                cause: Cause::ConnectorsForUse {
+            ctx.warn(Warning::new(
+                Cause::ConnectorsForUse {
                     from_mm: raised.from_mm,
                     to_mm: raised.to_mm,
                     done: raised.done.to_owned(),
                 },
-                pieces: raised.pair.to_vec(),
-                at: Some(raised.at.to_array()),
-            });
+                raised.pair.to_vec(),
+                Some(raised.at.to_array()),
+            ));
         }
         for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
             let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
@@ -482,8 +483,8 @@ impl ChosenSizes {
             let mut pieces: Vec<PatchId> = limited.iter().flat_map(|l| l.pair).collect();
             pieces.sort_unstable();
             pieces.dedup();
-            ctx.warn(Warning {
-                cause: Cause::ConnectorLimited {
+            ctx.warn(Warning::new(
+                Cause::ConnectorLimited {
                     pair: worst.pair,
                     by: worst.limit,
                     wanted_mm: worst.wanted_mm,
@@ -491,8 +492,8 @@ impl ChosenSizes {
                     n_others: limited.len() - 1,
                 },
                 pieces,
-                at: Some(worst.at.to_array()),
-            });
+                Some(worst.at.to_array()),
+            ));
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The space of possible plans: a survey under a tolerance and the constraints of earlier rounds, as bit
 //! sets.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::cluster::{DirectedJoint, loose_part};
 use super::local_cost::{PieceCosts, Role, SeamCosts, SeamStates, Surroundings, mask_of};

@@ -1,7 +1,7 @@
 //! Convergence of the randomised search, with and without its two techniques (Fig. 14).
 
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Ctx};
+use shellock_report::{Cancelled, Ctx};
 
 use super::draw::{DrawLimits, draw};
 use super::improve::improve;

@@ -1,7 +1,7 @@
 //! Measurements of the surface for planning, made once. Later rounds change only the constraints.
 
-use shellock_assembly::{Cancelled, Ctx, IdVec, PatchId};
 use shellock_geom::Vec3;
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
 use shellock_surface::{Seam, SegmentedSurface};
 
 use super::interface::{Interface, contacts};

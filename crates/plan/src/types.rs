@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
+use shellock_assembly::{InstallationPlan, InstallationStep, LatticeDirection};
+use shellock_report::{IdVec, PatchId};
 
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;

@@ -1,7 +1,7 @@
 //! Printers: build volumes, clearances, tolerances and materials.
 
-use shellock_assembly::params::ParamProblem;
 use shellock_mechanics::Material;
+use shellock_report::ParamProblem;
 
 /// Printing process, by the material that it hardens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -25,11 +25,11 @@ use std::f64::consts::PI;
 
 use region::{around, highest_of, lowest, spread};
 use serde::{Deserialize, Serialize};
-use shellock_assembly::PatchId;
 use shellock_geom::boolean::Volume;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_mechanics::{Bearing, Material, Meeting, Opening, ShellAssembly};
+use shellock_report::PatchId;
 
 use crate::impact::impact_n;
 

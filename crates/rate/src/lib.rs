@@ -4,8 +4,11 @@
 //! use, [`metric`] rates plans by simulation under them (Sect. 5), and [`stress_test`] punches and drops a
 //! finished kit (Sect. 7).
 
+mod causes;
 pub mod handling;
 pub mod impact;
 pub mod metric;
 pub mod strength;
 pub mod stress_test;
+
+pub use causes::Cause;

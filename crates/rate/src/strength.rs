@@ -28,19 +28,20 @@ mod thin;
 
 use std::f64::consts::{PI, TAU};
 
+use crate::causes::Cause;
 use falls::{Fallen, Falls};
 pub use hollow::{NoRoom, TooThin, has_room, is_hollow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
-use shellock_assembly::params::ParamProblem;
-use shellock_assembly::{Cancelled, Cause, Ctx, Warning};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::{Solid, TriMesh, Vec3};
 pub use shellock_mechanics::Material;
 use shellock_mechanics::{LoadCase, ShellError, ShellModel};
+use shellock_report::ParamProblem;
+use shellock_report::{Cancelled, Ctx, Warning};
 pub use thin::SolidRegion;
 
 use crate::impact::impact_n;
@@ -201,13 +202,13 @@ fn thickest(low_mm: f64, high_mm: f64, does: impl Fn(f64) -> bool) -> f64 {
 #[derive(Debug, thiserror::Error)]
 pub enum StrengthError {
     /// The shell's equations could not be solved.
-    #[error("the wall's stress could not be computed ({0}); give the thickness with --thickness")]
+    #[error("the wall's stress could not be computed ({0}); choose the thickness yourself")]
     Shell(#[from] ShellError),
     /// There is almost no cavity between two walls.
     #[error(
         "the model is hardly anywhere thicker than two walls of {wall_mm} mm, the thinnest that is made, so \
-         there is nothing to hollow out; print it solid, make it larger, or give a thinner wall with \
-         --thickness"
+         there is nothing to hollow out; print it solid, make it larger, or choose a thinner \
+         wall"
     )]
     NothingHollow {
         /// Thickness of the thinnest wall, mm.
@@ -282,28 +283,32 @@ impl Strength {
 
     /// Warnings for the user: a wall that is too weak, and regions where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
-        let weak = self.is_too_weak.then(|| Warning {
-            cause: Cause::WallTooWeak {
-                thickness_mm: self.thickness_mm,
-                drop_m: params.drop_m,
-                stress_mpa: self.stress_mpa,
-                strength_mpa: params.material.strength_mpa,
-                most_mm: self.most_mm,
-            },
-            pieces: Vec::new(),
-            at: Some(self.at.to_array()),
+        let weak = self.is_too_weak.then(|| {
+            Warning::new(
+                Cause::WallTooWeak {
+                    thickness_mm: self.thickness_mm,
+                    drop_m: params.drop_m,
+                    stress_mpa: self.stress_mpa,
+                    strength_mpa: params.material.strength_mpa,
+                    most_mm: self.most_mm,
+                },
+                Vec::new(),
+                Some(self.at.to_array()),
+            )
         });
         let total_mm2: f64 = self.solid.iter().map(|r| r.area_mm2).sum();
         let large = self.solid.first().filter(|r| r.area_mm2 >= TOLD_SOLID_MM2);
-        let solid = large.map(|largest| Warning {
-            cause: Cause::TooThinToHollow {
-                n_places: self.solid.len(),
-                share: total_mm2 / self.mesh.area(),
-                thickness_mm: self.thickness_mm,
-                largest_mm2: largest.area_mm2,
-            },
-            pieces: Vec::new(),
-            at: Some(largest.at),
+        let solid = large.map(|largest| {
+            Warning::new(
+                Cause::TooThinToHollow {
+                    n_places: self.solid.len(),
+                    share: total_mm2 / self.mesh.area(),
+                    thickness_mm: self.thickness_mm,
+                    largest_mm2: largest.area_mm2,
+                },
+                Vec::new(),
+                Some(largest.at),
+            )
         });
         weak.into_iter().chain(solid).collect()
     }
@@ -312,14 +317,14 @@ impl Strength {
     /// not.
     pub fn told_thinner(&self, params: &StrengthParams) -> Option<Warning> {
         let (thickness_mm, usual_mm) = (self.thickness_mm, params.least_mm);
-        (thickness_mm < usual_mm - TOLD_THINNER_MM).then_some(Warning {
-            cause: Cause::WallThinForRoom {
+        (thickness_mm < usual_mm - TOLD_THINNER_MM).then_some(Warning::new(
+            Cause::WallThinForRoom {
                 thickness_mm,
                 usual_mm,
             },
-            pieces: Vec::new(),
-            at: None,
-        })
+            Vec::new(),
+            None,
+        ))
     }
 }
 

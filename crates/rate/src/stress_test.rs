@@ -20,13 +20,14 @@ pub use chart::chart;
 pub use printed::FRICTION;
 
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{Cancelled, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
+use shellock_assembly::{InstallationPlan, InstallationStep, LatticeDirection};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::{Solid, Vec3};
 use shellock_mechanics::solid::{SolidError, SolidParams};
 use shellock_mechanics::{Meeting, ShellAssembly};
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{LatticePlan, PlanParams};
+use shellock_report::{Cancelled, Ctx, PatchId};
 use shellock_surface::{SegmentedSurface, Turn};
 
 use crate::handling::region::{highest, highest_in_the_middle};

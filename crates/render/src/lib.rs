@@ -14,7 +14,7 @@ pub mod svg;
 use serde::Serialize;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-use shellock_assembly::Warning;
+use shellock_report::Warning;
 
 pub use loads::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
 pub use page::{escaped, html};

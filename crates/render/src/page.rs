@@ -8,9 +8,9 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
-use shellock_assembly::{PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
+use shellock_report::{PatchId, Warning};
 
 use super::loads::LoadsHeader;
 use super::packed::{self, PackedMesh};
@@ -310,12 +310,22 @@ fn fill(template: &str, values: &[(&str, &str)]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use shellock_assembly::Cause;
+    use shellock_report::{Diagnostic, Told};
 
     use super::*;
     use crate::{ReportLoad, ReportLoads, ReportMove, ReportPart, ReportPlace};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
+
+    /// A cause whose sentence comes from a stranger.
+    #[derive(Debug)]
+    struct Hostile;
+
+    impl Diagnostic for Hostile {
+        fn tell(&self, _pieces: &[PatchId]) -> Told {
+            Told::problem("failed", HOSTILE.into())
+        }
+    }
 
     fn page() -> String {
         page_with(Vec::new())
@@ -337,13 +347,7 @@ mod tests {
             is_key: true,
             facts: vec![hostile()],
         };
-        let warning = Warning {
-            cause: Cause::Failed {
-                finding: HOSTILE.into(),
-            },
-            pieces: vec![PatchId(0)],
-            at: None,
-        };
+        let warning = Warning::new(Hostile, vec![PatchId(0)], None);
         html(&ReportData {
             title: HOSTILE.into(),
             facts: vec![hostile()],

@@ -263,12 +263,21 @@ mod tests {
         let cause: &Leaning = reversed.cause().expect("it keeps its kind");
         assert_eq!(cause.0, PatchId(5));
         assert_ne!(reversed, leaning(Severity::Note));
-        assert_eq!(reversed.renumber(&|PatchId(i)| PatchId(9 - i)), leaning(Severity::Note));
+        assert_eq!(
+            reversed.renumber(&|PatchId(i)| PatchId(9 - i)),
+            leaning(Severity::Note)
+        );
     }
 
     #[test]
     fn the_most_severe_come_first_and_equal_ones_keep_their_order() {
-        let all = [Severity::Note, Severity::Problem, Severity::Warning, Severity::Problem].map(leaning);
+        let all = [
+            Severity::Note,
+            Severity::Problem,
+            Severity::Warning,
+            Severity::Problem,
+        ]
+        .map(leaning);
         let ranked = Warning::ranked(&all);
         assert!(ranked.is_sorted_by_key(|w| std::cmp::Reverse(w.severity())));
         assert_eq!(ranked.len(), all.len());
@@ -285,6 +294,9 @@ mod tests {
             settings: Vec::new(),
             ..entry
         };
-        assert_eq!(bare.sentence_with(|_| panic!("there is none")), "pieces 1, 3 lean on 5");
+        assert_eq!(
+            bare.sentence_with(|_| panic!("there is none")),
+            "pieces 1, 3 lean on 5"
+        );
     }
 }

@@ -26,11 +26,11 @@ fn main() -> std::io::Result<()> {
         ok,
         figure: figure.into(),
     };
-    let warning = Warning {
-        cause: shellock::Cause::SeamWithoutConnector { length_mm: 12.4 },
-        pieces: vec![PatchId(1), PatchId(2)],
-        at: Some([0.0, 40.0, 118.0]),
-    };
+    let warning = Warning::new(
+        shellock::causes::Design::SeamWithoutConnector { length_mm: 12.4 },
+        vec![PatchId(1), PatchId(2)],
+        Some([0.0, 40.0, 118.0]),
+    );
     std::fs::write(folder.join("pieces.png"), pieces_picture(&pieces).png())?;
     let n = meshes.len();
     let values = (0..n)

@@ -14,6 +14,7 @@
 mod agenda;
 mod attempt;
 mod candidate;
+mod causes;
 mod cost;
 mod division;
 mod handover;
@@ -33,6 +34,7 @@ mod ways;
 pub use agenda::Effort;
 use agenda::{Agenda, Allowance, Grade, Report, Step};
 use attempt::Found;
+pub use causes::Cause;
 use handover::Handover;
 pub use kit::Kit;
 use outcome::Best;

@@ -28,11 +28,21 @@
 
 pub mod design;
 
+/// Causes of warnings, by the stage that finds them.
+pub mod causes {
+    pub use shellock_assembly::Cause as Verify;
+    pub use shellock_divide::Cause as Divide;
+    pub use shellock_make::Cause as Make;
+    pub use shellock_plan::Cause as Plan;
+    pub use shellock_rate::Cause as Rate;
+
+    pub use crate::design::Cause as Design;
+}
+
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use shellock_assembly::{
-    Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
-    PressFit, PressFitKind, Severity, Verdict, Warning, certificate, context, direction, ids, motion, params,
-    play, push, verify, warning,
+    Direction, InstallationPlan, InstallationStep, LatticeDirection, PressFit, PressFitKind, Verdict,
+    certificate, direction, motion, play, push, verify,
 };
 pub use shellock_divide::{key, segmentation};
 pub use shellock_figures as figure;
@@ -40,6 +50,9 @@ pub use shellock_make::{body, connector, coupon, piece};
 pub use shellock_plan as plan;
 pub use shellock_plan::sizes::{self, ConnectorSizes};
 pub use shellock_rate::{handling, metric, strength, stress_test};
+pub use shellock_report::{
+    Cancelled, Ctx, Diagnostic, IdVec, ParamProblem, PatchId, Progress, Severity, Told, Warning, WarningEntry,
+};
 pub use shellock_surface as surface;
 pub use shellock_surface::seam::graph::{Adjacency, ContactGraph};
 pub use shellock_surface::{Seam, SegmentedSurface, seam};

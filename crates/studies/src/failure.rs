@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use shellock::params::ParamProblem;
+use shellock::ParamProblem;
 
 /// Failure of a task, as one line for people.
 #[derive(Debug, thiserror::Error)]

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
-use shellock::context::Progress;
+use shellock::ParamProblem;
+use shellock::Progress;
 use shellock::design::{Params, Settings};
-use shellock::params::ParamProblem;
 use shellock::plan::{PlanSurvey, survey};
 use shellock::segmentation::segment;
 use shellock::sizes;

@@ -625,8 +625,8 @@ fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
     let model = &of.figure.model;
     let params = fitted(&session, &checked(&of.options)?, &of.options, model)?;
     let notes: Mutex<Vec<String>> = Mutex::default();
-    let report = |progress: shellock::context::Progress<'_>| {
-        if let shellock::context::Progress::Note(text) = progress {
+    let report = |progress: shellock::Progress<'_>| {
+        if let shellock::Progress::Note(text) = progress {
             notes
                 .lock()
                 .expect("no holder of this lock panics")

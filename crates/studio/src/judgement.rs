@@ -52,7 +52,7 @@ pub fn judge(
     } else {
         checked
     };
-    let quiet = |_: shellock::context::Progress<'_>| ();
+    let quiet = |_: shellock::Progress<'_>| ();
     let ctx = Ctx::new(&quiet, &session.stop);
     let outlook = outlook(
         &ctx,

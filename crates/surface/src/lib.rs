@@ -5,8 +5,8 @@ pub mod plane;
 pub mod seam;
 mod turn;
 
-use shellock_assembly::{IdVec, PatchId};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_report::{IdVec, PatchId};
 pub use turn::Turn;
 
 /// The model's closed surface, cut along the seams so that each triangle belongs to one patch.

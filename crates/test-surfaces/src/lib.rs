@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shellock_assembly::PatchId;
 use shellock_geom::{TriMesh, Vec3};
+use shellock_report::PatchId;
 use shellock_surface::{Seam, SegmentedSurface};
 pub use shellock_testkit::shapes::sphere;
 

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use syn::visit::Visit;
 
 /// Order of a crate's modules; each may name those before it.
-const ASSEMBLY: [&str; 10] = [
-    "ids",
-    "context",
+const ASSEMBLY: [&str; 9] = [
+    "causes",
     "direction",
     "sequence",
     "press_fit",
@@ -21,34 +20,55 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the lowest up, each with those that its library or program may depend on.
-const FLOORS: [(&str, &[&str]); 21] = [
+const FLOORS: [(&str, &[&str]); 22] = [
+    ("report", &[]),
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
     ("mechanics", &["geom"]),
     ("segment", &["geom"]),
     ("figures", &["geom"]),
-    ("assembly", &["geom"]),
-    ("render", &["geom", "assembly"]),
-    ("surface", &["geom", "assembly"]),
-    ("divide", &["geom", "assembly", "segment", "surface"]),
-    ("plan", &["geom", "assembly", "mechanics", "surface"]),
+    ("assembly", &["report", "geom"]),
+    ("render", &["report", "geom"]),
+    ("surface", &["report", "geom", "assembly"]),
+    ("divide", &["report", "geom", "segment", "assembly", "surface"]),
+    ("plan", &["report", "geom", "mechanics", "assembly", "surface"]),
     (
         "rate",
-        &["geom", "assembly", "mechanics", "render", "surface", "plan"],
+        &[
+            "report",
+            "geom",
+            "mechanics",
+            "assembly",
+            "render",
+            "surface",
+            "plan",
+        ],
     ),
     (
         "volume",
-        &["geom", "assembly", "mechanics", "surface", "plan", "rate"],
+        &[
+            "report",
+            "geom",
+            "mechanics",
+            "assembly",
+            "surface",
+            "plan",
+            "rate",
+        ],
     ),
-    ("make", &["geom", "assembly", "mechanics", "surface", "plan"]),
+    (
+        "make",
+        &["report", "geom", "mechanics", "assembly", "surface", "plan"],
+    ),
     (
         "shellock",
         &[
+            "report",
             "geom",
-            "assembly",
             "mechanics",
             "figures",
+            "assembly",
             "surface",
             "divide",
             "plan",
@@ -56,11 +76,12 @@ const FLOORS: [(&str, &[&str]); 21] = [
             "make",
         ],
     ),
-    ("print", &["geom", "mechanics", "assembly", "render"]),
-    ("kit", &["geom", "assembly", "shellock", "print"]),
+    ("print", &["report", "geom", "mechanics", "render"]),
+    ("kit", &["report", "geom", "assembly", "shellock", "print"]),
     (
         "job",
         &[
+            "report",
             "geom",
             "formats",
             "mechanics",
@@ -78,12 +99,12 @@ const FLOORS: [(&str, &[&str]); 21] = [
             "formats",
             "mechanics",
             "render",
+            "volume",
             "shellock",
             "print",
             "kit",
             "job",
             "studio",
-            "volume",
         ],
     ),
     ("testkit", &["geom"]),

@@ -7,7 +7,7 @@
 #[cfg(test)]
 mod tests;
 
-use shellock_assembly::{Cancelled, Ctx, InstallationPlan};
+use shellock_assembly::InstallationPlan;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Joint, Meeting, StressLevel};
@@ -20,6 +20,7 @@ use shellock_rate::stress_test::{
     Comparison, Outcome, PUNCH_RADIUS_MM, Pair, StressError, StressParams, StressVerdict, TestSubject, hit,
     is_open, largest_mm, limit_mm,
 };
+use shellock_report::{Cancelled, Ctx};
 use shellock_surface::SegmentedSurface;
 
 use crate::{Loaded, VolumeError, VolumeModel, VolumeParams};

@@ -32,7 +32,6 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
-
 use shellock_geom::Vec3;
 
 use crate::PatchId;

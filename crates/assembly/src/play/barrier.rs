@@ -247,9 +247,10 @@ fn height_on_axis(t: [Vec3; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock_geom::Volume;
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     /// Barrier that `roof` forms above the origin, which is `sideways` off the centre, for motions of
     /// `radius`.

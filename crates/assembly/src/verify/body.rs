@@ -175,8 +175,9 @@ fn edge_use(mesh: &TriMesh) -> EdgeUse {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     fn joined(parts: &[TriMesh]) -> TriMesh {
         let mut all = TriMesh::default();

@@ -199,11 +199,12 @@ fn place(gap_mm: f64, travel_mm: f64, at: [f64; 3]) -> NearestPlace {
 
 #[cfg(test)]
 mod tests {
+    use shellock_geom::{Vec3, Volume};
+    use shellock_testkit::shapes::cuboid;
+
     use super::*;
     use crate::InstallationStep;
     use crate::LatticeDirection;
-    use shellock_geom::{Vec3, Volume};
-    use shellock_testkit::shapes::cuboid;
 
     /// A block that lies in a tray, flush with its rim, and touches only the walls there. It leaves upwards.
     fn kit() -> (Solid, IdVec<PatchId, TriMesh>, InstallationPlan) {

@@ -219,9 +219,10 @@ fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock_geom::Volume;
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     #[test]
     fn ray_lengths_add_up_to_volumes_of_solids_and_of_their_common_part() {

@@ -2,13 +2,15 @@
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
+use shellock_report::Warning;
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::limits::{OUTSIDE_SHARE, OVERLAP_MM3};
 use super::{Check, Finding, rounded};
 use crate::PressFit;
-use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
+use crate::causes::Cause;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Greatest common volume of a detent or a rib with its counterpart, mm³: 2.8 × 0.6 × 0.4 mm, and rounding.
 const PRESSED_MM3: f64 = 0.8;
@@ -56,11 +58,11 @@ pub fn check_pairs(
         if volume_mm3 > OVERLAP_MM3 {
             findings.push(Finding::Overlap { a, b, volume_mm3, at });
         } else if volume_mm3 > WARN_MM3 {
-            ctx.warn(Warning {
-                cause: Cause::SmallOverlap { volume_mm3 },
-                pieces: vec![a, b],
-                at: Some(at),
-            });
+            ctx.warn(Warning::new(
+                Cause::SmallOverlap { volume_mm3 },
+                vec![a, b],
+                Some(at),
+            ));
         }
     }
     let figure = format!("worst {worst:.4} mm³ in {} pairs", pairs.len());
@@ -123,9 +125,10 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
 
 #[cfg(test)]
 mod tests {
+    use shellock_testkit::shapes::cuboid;
+
     use super::*;
     use crate::PressFitKind;
-    use shellock_testkit::shapes::cuboid;
 
     #[test]
     fn a_press_fit_explains_what_it_takes_and_nothing_larger_or_elsewhere() {

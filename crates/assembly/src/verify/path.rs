@@ -235,11 +235,12 @@ fn rub_at(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use rand::RngExt;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     fn random_boxes(rng: &mut ChaCha8Rng, shift: Vec3) -> Volume {
         let mut corner = || Vec3::new(rng.random(), rng.random(), rng.random()) * 6.0;

@@ -50,8 +50,9 @@ pub fn on_surface(mesh: &TriMesh, n: usize, seed: u64) -> Vec<Sample> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     #[test]
     fn each_face_of_a_box_gets_its_share_of_the_points() {

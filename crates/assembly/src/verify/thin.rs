@@ -230,9 +230,10 @@ fn joined(points: &[ThinPoint]) -> Vec<Vec<ThinPoint>> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use shellock_geom::{Vec3, Volume};
     use shellock_testkit::shapes::cuboid;
+
+    use super::*;
 
     #[test]
     fn the_thin_part_of_a_block_with_a_fin_is_the_fin() {

@@ -64,7 +64,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
 fn shown_division(session: &Session, model: &Model, options: &Options) -> Result<Division, Failure> {
     let params = division::params(&session.job, model, options)?;
     let display = Display::new(session.shown);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: shellock::Progress<'_>| display.show(p);
     let division = divide(Ctx::new(&report, &session.job.stop), params, model, options);
     display.finish();
     division

@@ -22,7 +22,7 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
     }
     let own = OwnAssembly::read(folder)?;
     let display = Display::new(session.shown);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: shellock::Progress<'_>| display.show(p);
     let found = own.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();
     let found = found?;

@@ -28,7 +28,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     }
     let model = input::model(&session.job, file, options)?;
     let display = Display::new(session.shown);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: shellock::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.job.stop);
     let surface = divided(&session.job, &ctx, &model, options)?;
     display.finish();

@@ -16,7 +16,7 @@ use crate::progress::Display;
 pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
     let test = StressTest::read(kit, &blows.into())?;
     let display = Display::new(session.shown);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: shellock::Progress<'_>| display.show(p);
     let tested = run(&Ctx::new(&report, &session.job.stop), &test, blows.compare);
     display.finish();
     let tested = tested?;

@@ -16,7 +16,7 @@ use crate::progress::Display;
 pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8, Failure> {
     let kit = Finished::read(kit, model)?;
     let display = Display::new(session.shown);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: shellock::Progress<'_>| display.show(p);
     let verdict = kit.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();
     let verdict = verdict?;

@@ -1,7 +1,8 @@
 //! Conditions on the shape of a user's key, so that it slides on rails [Yao2017, Sect. 4.2 and 6.1].
 
-use shellock_assembly::{Cause, PatchId, Warning};
+use crate::causes::Cause;
 use shellock_geom::Vec3;
+use shellock_report::{PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 use shellock_surface::plane::{Plane, Spot};
 
@@ -45,11 +46,7 @@ impl KeyConditions {
     /// Warnings for the conditions that are broken, with places. `connector_mm` is the size of the key's
     /// connectors; `may_be_cut` is true if cutting a key instead is possible and was not tried.
     pub fn problems(&self, key: PatchId, connector_mm: f64, may_be_cut: bool) -> Vec<Warning> {
-        let warning = |at: Vec3, cause: Cause| Warning {
-            cause,
-            pieces: vec![key],
-            at: Some(at.to_array()),
-        };
+        let warning = |at: Vec3, cause: Cause| Warning::new(cause, vec![key], Some(at.to_array()));
         let mut found = Vec::new();
         if self.flat_share < LEAST_FLAT {
             let (at, off_mm) = self.farthest;

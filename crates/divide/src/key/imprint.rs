@@ -1,10 +1,10 @@
 //! Imprint of a key: makes the surface inside a prism a patch of its own.
 
-use shellock_assembly::PatchId;
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology, TriMesh};
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 use super::KeyPrism;

@@ -3,10 +3,11 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Ctx, LatticeDirection};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::topology::components;
 use shellock_geom::{Topology, TriMesh, Vec3};
+use shellock_report::{Cancelled, Ctx};
 use shellock_surface::plane::{Plane, Spot};
 use shellock_surface::{SegmentedSurface, Turn};
 

@@ -2,8 +2,9 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shellock_assembly::{Ctx, LatticeDirection};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::{Topology, TriMesh, Vec3};
+use shellock_report::Ctx;
 use shellock_surface::SegmentedSurface;
 use shellock_test_surfaces::{label, sphere, voronoi};
 

@@ -1,7 +1,8 @@
 //! Changes to the user's labels, reported for the final surface.
 
-use shellock_assembly::{Cause, Ctx, PatchId, Warning};
+use crate::causes::Cause;
 use shellock_geom::Solid;
+use shellock_report::{Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 
 use super::keep_whole::{place_in, tell_cut};
@@ -90,11 +91,7 @@ pub fn tell(
         let pieces = graph.articulation_pieces();
         // A region to keep whole may be the reason why the fault remained.
         let at = place_in(&keep, surface, &pieces);
-        ctx.warn(Warning {
-            cause: Cause::WeakGraph,
-            pieces,
-            at,
-        });
+        ctx.warn(Warning::new(Cause::WeakGraph, pieces, at));
     }
     Ok(())
 }
@@ -124,11 +121,7 @@ fn tell_divided(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &Segmented
         .flat_map(|&l| changes.pieces_of[l].clone())
         .collect();
     let at = middle(surface, changes.pieces_of[first][0]);
-    ctx.warn(Warning {
-        cause: Cause::LabelsDivided { into },
-        pieces,
-        at,
-    });
+    ctx.warn(Warning::new(Cause::LabelsDivided { into }, pieces, at));
 }
 
 fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
@@ -139,13 +132,13 @@ fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedS
         .filter(|(_, labels)| labels.len() > 1)
     {
         let piece = PatchId::from(piece);
-        ctx.warn(Warning {
-            cause: Cause::LabelsJoined {
+        ctx.warn(Warning::new(
+            Cause::LabelsJoined {
                 labels: labels.iter().map(|&l| names[l]).collect(),
             },
-            pieces: vec![piece],
-            at: middle(surface, piece),
-        });
+            vec![piece],
+            middle(surface, piece),
+        ));
     }
 }
 
@@ -160,14 +153,14 @@ fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface
     let mut pieces: Vec<PatchId> = short.iter().flat_map(|c| [c.a, c.b]).collect();
     pieces.sort_unstable();
     pieces.dedup();
-    ctx.warn(Warning {
-        cause: Cause::ShortContacts {
+    ctx.warn(Warning::new(
+        Cause::ShortContacts {
             from_mm: limit_mm,
             to_mm: params.min_contact_mm,
         },
         pieces,
-        at: None,
-    });
+        None,
+    ));
 }
 
 /// Middle of some triangle of `piece`, mm.

@@ -8,8 +8,8 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use shellock_assembly::Ctx;
 use shellock_geom::{Solid, Topology, TriMesh};
+use shellock_report::Ctx;
 
 use super::dual_graph::{CreaseCost, DualGraph};
 use super::{FaceLabels, SegmentationError, SegmentationParams};

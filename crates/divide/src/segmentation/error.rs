@@ -1,6 +1,6 @@
 //! Reasons why a surface cannot be divided, as messages for people.
 
-use shellock_assembly::{Cancelled, PatchId};
+use shellock_report::{Cancelled, PatchId};
 
 /// Error of the division of a surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

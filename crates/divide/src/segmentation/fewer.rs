@@ -228,7 +228,7 @@ mod tests {
             patch_of_face: labels
                 .as_slice()
                 .iter()
-                .map(|&k| shellock_assembly::PatchId(k.min(1)))
+                .map(|&k| shellock_report::PatchId(k.min(1)))
                 .collect(),
             source_face: (0..mesh.triangles.len() as u32).collect(),
             n_patches: 2,

@@ -4,11 +4,12 @@
 //! divides it, and keys are cut elsewhere. Seams are smoothed as everywhere, so [`tell_cut`] measures the
 //! final result.
 
+use crate::causes::Cause;
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{Cause, Ctx, PatchId, Warning};
 use shellock_geom::bvh::nearest_on_triangle;
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology, TriMesh, Vec3};
+use shellock_report::{Ctx, PatchId, Warning};
 use shellock_segment::whole::Whole;
 use shellock_surface::{SegmentedSurface, Turn};
 
@@ -233,11 +234,11 @@ pub(super) fn tell_cut(ctx: &Ctx, keep: &[KeepWhole], surface: &SegmentedSurface
         if let Some((.., pieces, at)) = worst
             && share < LEAST_SHARE
         {
-            ctx.warn(Warning {
-                cause: Cause::KeepWholeCut { share },
-                pieces: pieces.clone(),
-                at: Some(at.to_array()),
-            });
+            ctx.warn(Warning::new(
+                Cause::KeepWholeCut { share },
+                pieces.clone(),
+                Some(at.to_array()),
+            ));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Repair of a drawn division until the contact graph of its smooth seams has no faults.
 
-use shellock_assembly::Ctx;
+use shellock_report::Ctx;
 use shellock_segment::mirrored::Mirrored;
 use shellock_surface::SegmentedSurface;
 

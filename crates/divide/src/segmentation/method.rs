@@ -1,8 +1,8 @@
 //! Automatic division of a surface without labels, by one of several methods.
 
 use serde::{Deserialize, Serialize};
-use shellock_assembly::Ctx;
 use shellock_geom::{Solid, TriMesh};
+use shellock_report::Ctx;
 use shellock_segment::auto::AutoParams;
 use shellock_segment::coarse::Coarse;
 use shellock_segment::face_graph::FaceGraph;

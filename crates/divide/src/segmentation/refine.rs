@@ -8,8 +8,8 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use shellock_assembly::{Ctx, PatchId};
 use shellock_geom::{HalfEdge, Solid, Topology};
+use shellock_report::{Ctx, PatchId};
 use shellock_segment::face_graph::FaceGraph;
 use shellock_segment::whole::Whole;
 use shellock_surface::seam::graph::{Adjacency, ContactGraph};

@@ -3,10 +3,10 @@
 //! Soft labels `u_k = (M + t L)⁻¹ M 1_k` with lumped mass M, cotangent Laplacian L and t = `smoothing_mm2`:
 //! one implicit step of heat flow. By the maximum principle, it keeps all u in [0, 1] and their sum at 1.
 
-use shellock_assembly::{Ctx, PatchId};
 use shellock_geom::laplacian::{half_cotangents, lumped_mass};
 use shellock_geom::sparse::{Cholesky, SparseSymmetric};
 use shellock_geom::{Solid, TriMesh};
+use shellock_report::{Ctx, PatchId};
 use shellock_surface::SegmentedSurface;
 
 use super::cut::cut_along_ties;

@@ -7,9 +7,10 @@
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::topology::ends;
 use shellock_geom::{HalfEdge, Solid, Topology, TriMesh, Vec3};
+use shellock_report::PatchId;
 use shellock_segment::whole::Whole;
 use shellock_surface::seam::graph::ContactGraph;
 use shellock_surface::seam::{seam_half_edges, stretches};

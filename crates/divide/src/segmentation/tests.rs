@@ -8,7 +8,7 @@ fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
 }
 
 /// Runs `run` and returns its result with the warnings.
-fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<shellock_assembly::Warning>) {
+fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<shellock_report::Warning>) {
     let ctx = Ctx::quiet();
     (run(&ctx), ctx.into_warnings())
 }
@@ -111,7 +111,7 @@ fn segment_thin_arms(
 ) -> (
     SegmentationParams,
     SegmentedSurface,
-    Vec<shellock_assembly::Warning>,
+    Vec<shellock_report::Warning>,
 ) {
     let solid = limbed();
     let params = SegmentationParams {
@@ -493,8 +493,8 @@ fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
             ..SegmentationParams::default()
         };
         let told = std::sync::Mutex::new(Vec::new());
-        let report = |p: shellock_assembly::context::Progress<'_>| {
-            if let shellock_assembly::context::Progress::Note(text) = p {
+        let report = |p: shellock_report::Progress<'_>| {
+            if let shellock_report::Progress::Note(text) = p {
                 told.lock().unwrap().push(text.to_owned());
             }
         };

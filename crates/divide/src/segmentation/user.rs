@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use shellock_assembly::{Cause, Ctx, PatchId, Warning};
+use crate::causes::Cause;
 use shellock_geom::{Solid, Topology, TriMesh};
+use shellock_report::{Ctx, PatchId, Warning};
 
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 
@@ -132,16 +133,16 @@ impl<'a> Parts<'a> {
             }
         }
         if let Some((area, name, at)) = largest {
-            ctx.warn(Warning {
-                cause: Cause::LabelIslands {
+            ctx.warn(Warning::new(
+                Cause::LabelIslands {
                     n: n_islands,
                     area_mm2: islands_mm2,
                     largest_mm2: area,
                     largest_label: name,
                 },
-                pieces: Vec::new(),
+                Vec::new(),
                 at,
-            });
+            ));
         }
     }
 
@@ -197,11 +198,7 @@ impl<'a> Parts<'a> {
 
     fn warn(&self, ctx: &Ctx, part: usize, cause: Cause) {
         let at = self.place_of(part);
-        ctx.warn(Warning {
-            cause,
-            pieces: Vec::<PatchId>::new(),
-            at,
-        });
+        ctx.warn(Warning::new(cause, Vec::<PatchId>::new(), at));
     }
 
     fn place_of(&self, part: usize) -> Option<[f64; 3]> {

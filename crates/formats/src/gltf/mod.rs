@@ -202,7 +202,7 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
 
 /// Notes on what the document contains beyond the visible triangles.
 fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
-    let mut notes = vec!["in glTF y points up: give --up y".to_owned()];
+    let mut notes = vec!["in glTF y points up: choose y as the axis that points up".to_owned()];
     notes.extend(left_out(nodes.n_hidden, "hidden mesh is", "hidden meshes are"));
     let n_others = document.scenes.len().saturating_sub(1);
     notes.extend(left_out(n_others, "other scene is", "other scenes are"));

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::files::with_slashes;
-
 use crate::failure::Failure;
+use crate::files::with_slashes;
 use crate::input::sha256;
 use crate::output::PLAN;
 

@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use crate::files::with_slashes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Entry;
 use crate::failure::{Failure, TIME_UP};
+use crate::files::with_slashes;
 use crate::files::write;
 use crate::input::sha256;
 use crate::output::PLAN;

@@ -1,10 +1,10 @@
 //! Size of the kit: as the options say, as the file states it, or a guess that the user is warned of.
 
 use shellock::Warning;
-use shellock::warning::Cause;
 use shellock_formats::{Format, Loaded};
 use shellock_geom::Aabb;
 
+use crate::causes::Cause;
 use crate::failure::Failure;
 use crate::options::Options;
 
@@ -152,11 +152,7 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
 }
 
 fn warning(code: &'static str, sentence: String) -> Warning {
-    Warning {
-        cause: Cause::Input { code, sentence },
-        pieces: Vec::new(),
-        at: None,
-    }
+    Warning::new(Cause::Input { code, sentence }, Vec::new(), None)
 }
 
 #[cfg(test)]
@@ -181,8 +177,8 @@ mod tests {
     fn a_guess_offers_each_unit_that_fits_and_millimetres_wherever_a_kit_can_be_made() {
         let read = |text: String| shellock_formats::read_mesh(text.as_bytes(), Some("obj")).unwrap();
         let loaded = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned());
-        let told = |longest: f64| match guess(&loaded, longest).cause {
-            Cause::Input { sentence, .. } => sentence,
+        let told = |longest: f64| match guess(&loaded, longest).cause() {
+            Some(Cause::Input { sentence, .. }) => sentence.clone(),
             other => panic!("{other:?}"),
         };
         assert!(told(1500.0).contains("1500 units") && told(1500.0).contains("1500 mm with --unit mm"));

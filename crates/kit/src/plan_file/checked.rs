@@ -3,8 +3,9 @@
 use std::ops::RangeInclusive;
 
 use shellock::ConnectorSizes;
-use shellock_assembly::{Direction, InstallationPlan, InstallationStep, PatchId, PressFit};
+use shellock_assembly::{Direction, InstallationPlan, InstallationStep, PressFit};
 use shellock_geom::Vec3;
+use shellock_report::PatchId;
 
 use super::{PlanFile, PlanFileError};
 

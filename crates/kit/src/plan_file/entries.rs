@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use shellock::strength::Material;
-use shellock_assembly::PatchId;
 use shellock_assembly::verify::{Check, Finding, ThinFeature};
+use shellock_report::PatchId;
 
 use super::{even_null, if_readable};
 

@@ -7,10 +7,10 @@ use shellock::key::KeySite;
 use shellock::strength::Strength;
 use shellock_assembly::verify::Play;
 use shellock_assembly::verify::clearance::PathGap;
-use shellock_assembly::{PatchId, Warning};
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_print::time::{Cost, whole_words};
 use shellock_print::{Plates, Printer, Process};
+use shellock_report::{PatchId, Warning};
 
 use super::{
     ContactEntry, FORMAT, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, LoosestEntry,

@@ -4,11 +4,12 @@
 //! A chip with outer skin is given to the body that it touches most, over a bridge in the gap between them;
 //! otherwise the surface would have a hole there. A chip that cannot be joined to any body is dropped.
 
+use crate::causes::Cause;
 use rayon::prelude::*;
-use shellock_assembly::{Cause, Ctx, PatchId, Warning};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::grown::grown;
 use shellock_geom::{Aabb, Vec3, Volume};
+use shellock_report::{Ctx, PatchId, Warning};
 
 use super::grid::ShellGrid;
 
@@ -50,24 +51,24 @@ pub(super) fn whole_bodies(
         for chip in std::mem::take(&mut parts[from].chips) {
             let is_worth = chip.volume() > CRUMB_MM3 && has_skin(grid, &chip);
             match is_worth.then(|| give(grid, gap_mm, &mut parts, &chip)).flatten() {
-                Some(to) if to != from && chip.volume() > GIVEN_TOLD_MM3 => ctx.warn(Warning {
-                    cause: Cause::PartGiven {
+                Some(to) if to != from && chip.volume() > GIVEN_TOLD_MM3 => ctx.warn(Warning::new(
+                    Cause::PartGiven {
                         given_mm3: chip.volume(),
                     },
-                    pieces: vec![parts[from].piece, parts[to].piece],
-                    at: Some(chip.bounds().center().to_array()),
-                }),
+                    vec![parts[from].piece, parts[to].piece],
+                    Some(chip.bounds().center().to_array()),
+                )),
                 Some(_) => {}
                 None => dropped.push(chip),
             }
         }
         let dropped_mm3: f64 = dropped.iter().map(Volume::volume).sum();
         if dropped_mm3 > TOLD_MM3 {
-            ctx.warn(Warning {
-                cause: Cause::BodyInParts { dropped_mm3 },
-                pieces: vec![parts[from].piece],
-                at: dropped.first().map(|c| c.bounds().center().to_array()),
-            });
+            ctx.warn(Warning::new(
+                Cause::BodyInParts { dropped_mm3 },
+                vec![parts[from].piece],
+                dropped.first().map(|c| c.bounds().center().to_array()),
+            ));
         }
     }
     parts.into_iter().map(|p| (p.piece, p.body)).collect()

@@ -1,6 +1,7 @@
 //! Reasons why there are no bodies.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 /// Reason why the wall cannot be split.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -17,5 +18,5 @@ pub enum BodyError {
     },
     /// The user asked to stop.
     #[error(transparent)]
-    Cancelled(#[from] shellock_assembly::Cancelled),
+    Cancelled(#[from] shellock_report::Cancelled),
 }

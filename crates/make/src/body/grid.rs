@@ -1,7 +1,7 @@
 //! The grid that bodies are computed on: depth below the surface, and distances to the patches.
 
 use rayon::prelude::*;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::band::{Band, GridTooFine};
 use shellock_geom::boolean::NotAVolume;
 use shellock_geom::bvh::TriangleBvh;
@@ -9,6 +9,7 @@ use shellock_geom::decimate::decimate;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 use super::BodyParams;

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::band::Band;
 use shellock_geom::decimate::decimate;
 use shellock_geom::level_cut::{Side, cut_at_zero};
@@ -11,6 +11,7 @@ use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
 use shellock_surface::SegmentedSurface;
 
 use super::chips::whole_bodies;

@@ -22,8 +22,9 @@
 //! whole wedge below a concave edge.)
 
 use rayon::prelude::*;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 use super::ShellGrid;

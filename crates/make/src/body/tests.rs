@@ -1,6 +1,7 @@
-use shellock_assembly::{Ctx, IdVec, LatticeDirection};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_plan::{LatticePlan, LatticeStep};
+use shellock_report::{Ctx, IdVec};
 use shellock_surface::SegmentedSurface;
 use shellock_test_surfaces::{label, sphere};
 
@@ -46,11 +47,7 @@ fn built(
 
 /// Asserts that every piece leaves what was installed before it, along its direction, with less than
 /// `most_mm3` of overlap.
-fn assert_leave_freely(
-    bodies: &IdVec<shellock_assembly::PatchId, Volume>,
-    plan: &LatticePlan,
-    most_mm3: f64,
-) {
+fn assert_leave_freely(bodies: &IdVec<shellock_report::PatchId, Volume>, plan: &LatticePlan, most_mm3: f64) {
     for (at, step) in plan.steps.iter().enumerate().skip(1) {
         for travel_mm in [0.0, 0.3, 1.0, 3.0, 8.0] {
             let moved = bodies[step.piece].translate(travel_mm * step.separation.unit());
@@ -193,7 +190,7 @@ fn what_came_off_a_body_with_skin_goes_to_the_body_beside_it() {
     let (surface, plan) = octants();
     let params = BodyParams::default();
     let (grid, built) = built(&params, &surface, &plan);
-    let mut parts: Vec<(shellock_assembly::PatchId, Volume)> = Vec::new();
+    let mut parts: Vec<(shellock_report::PatchId, Volume)> = Vec::new();
     for (i, body) in built.unwrap().bodies.as_slice().iter().enumerate() {
         parts.push((i.into(), body.clone()));
     }

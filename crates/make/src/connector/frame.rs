@@ -1,8 +1,8 @@
 //! Curves along the seams on the inner surface, with a smooth frame at every point.
 
-use shellock_assembly::PatchId;
 use shellock_geom::Vec3;
 use shellock_plan::LatticePlan;
+use shellock_report::PatchId;
 use shellock_surface::seam::FramedLine;
 use shellock_surface::{Seam, SegmentedSurface};
 

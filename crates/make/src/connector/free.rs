@@ -1,8 +1,8 @@
 //! Test of points below the wall: may a piece have material there?
 
 use rayon::prelude::*;
-use shellock_assembly::PatchId;
 use shellock_geom::Vec3;
+use shellock_report::PatchId;
 
 use super::ConnectorParams;
 use crate::body::{ShellBodies, ShellGrid};

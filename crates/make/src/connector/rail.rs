@@ -47,7 +47,7 @@ pub(super) fn rails(
     curve: &Curve,
     slide: Vec3,
     size_mm: f64,
-    is_free: &dyn Fn(shellock_assembly::PatchId, Vec3) -> Option<bool>,
+    is_free: &dyn Fn(shellock_report::PatchId, Vec3) -> Option<bool>,
 ) -> (Vec<Run>, f64) {
     let (mut rails, mut usable_mm) = (Vec::new(), 0.0);
     for (from, to) in along_slide(curve, slide, size_mm) {
@@ -174,7 +174,7 @@ fn rail(
     axes: &Axes,
     [back, front]: [Place; 2],
     size_mm: f64,
-    is_free: &dyn Fn(shellock_assembly::PatchId, Vec3) -> Option<bool>,
+    is_free: &dyn Fn(shellock_report::PatchId, Vec3) -> Option<bool>,
 ) -> Option<Run> {
     let (male, female) = (curve.earlier, curve.later);
     let clearance_mm = params.clearance_of(true);

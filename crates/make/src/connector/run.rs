@@ -1,9 +1,9 @@
 //! Runs of connectors, and the places where connectors can be.
 
-use shellock_assembly::PatchId;
 use shellock_geom::Vec3;
 use shellock_plan::LatticePlan;
 use shellock_plan::sizes::ConnectorSizes;
+use shellock_report::PatchId;
 use shellock_surface::seam::later_is_male;
 use shellock_surface::seam::rules::{
     MAX_ALONG_SEAM, MAX_BACKWARD_RAD, SHARPEST_TURN, SHORTEST_RUN_SIZES, end_gap_mm,

@@ -1,8 +1,9 @@
 //! Half connectors as volumes, and the swept volumes that are carved from them.
 
 use rayon::prelude::*;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Vec3, Volume};
+use shellock_report::PatchId;
 
 use crate::connector::{ConnectorParams, Part, Run, RunStation, Section};
 

@@ -1,13 +1,15 @@
 //! Finishing: from bodies and runs to printable meshes.
 
+use crate::causes::Cause;
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Cause, Ctx, IdVec, PatchId, PressFit, Warning};
+use shellock_assembly::PressFit;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
 use shellock_surface::Turn;
 
 use super::carve::{Half, SweptVolume, carved, whole_half};
@@ -208,11 +210,11 @@ fn carved_halves(
 fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Change> {
     let cut = notch(grip, &shell.bodies[grip.key].to_mesh());
     if cut.is_none() {
-        ctx.warn(Warning {
-            cause: Cause::KeyWithoutGrip,
-            pieces: vec![grip.key],
-            at: Some(grip.at.to_array()),
-        });
+        ctx.warn(Warning::new(
+            Cause::KeyWithoutGrip,
+            vec![grip.key],
+            Some(grip.at.to_array()),
+        ));
     }
     cut
 }
@@ -421,11 +423,7 @@ fn ribs_of_key(
         ribs(interference_mm, &seat, depth)
     });
     if made.0.is_empty() {
-        ctx.warn(Warning {
-            cause: Cause::KeyWithoutRibs,
-            pieces: vec![key],
-            at: None,
-        });
+        ctx.warn(Warning::new(Cause::KeyWithoutRibs, vec![key], None));
     }
     made
 }
@@ -486,9 +484,5 @@ fn warn_of_missing_numbers(ctx: &Ctx, pieces: Vec<PatchId>) {
     if pieces.is_empty() {
         return;
     }
-    ctx.warn(Warning {
-        cause: Cause::PieceWithoutNumber,
-        pieces,
-        at: None,
-    });
+    ctx.warn(Warning::new(Cause::PieceWithoutNumber, pieces, None));
 }

@@ -1,8 +1,9 @@
 //! Features of keys alone: detents that click, and a notch to pull at.
 
-use shellock_assembly::{PatchId, PressFit, PressFitKind};
+use shellock_assembly::{PressFit, PressFitKind};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
+use shellock_report::PatchId;
 
 use crate::connector::{ConnectorParams, Run, RunStation, Section};
 

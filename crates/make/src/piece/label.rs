@@ -14,9 +14,9 @@
 mod digits;
 
 use digits::Drawing;
-use shellock_assembly::params::ParamProblem;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
+use shellock_report::ParamProblem;
 
 use crate::body::ShellGrid;
 

@@ -6,10 +6,10 @@
 //! too near is grown by the clearance, swept against the piece's way, and cut from the piece.
 
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Ctx, IdVec, PatchId};
 use shellock_geom::clearance::{Passed, Translation, faces_passed};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
 
 use super::carve::distances_that_meet;
 

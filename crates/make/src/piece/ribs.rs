@@ -4,10 +4,11 @@
 //! a little beyond the other piece's side. Pressed in, ribs are flattened or bend the walls, and their
 //! friction keeps the key in its seat.
 
-use shellock_assembly::{PatchId, PressFit, PressFitKind};
+use shellock_assembly::{PressFit, PressFitKind};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::{Scope, Shape, Translation, swept_gap};
 use shellock_geom::{Solid, TriMesh, Vec3, Volume};
+use shellock_report::PatchId;
 
 use super::key_parts::Change;
 

@@ -14,8 +14,8 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 use shellock_assembly::verify::{ThinPoint, thin_points};
-use shellock_assembly::{Cancelled, Ctx, IdVec, PatchId};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Greatest thickness of sheets that are shaved, mm, also where the printer's least wall is thicker: the
 /// connectors' own walls are no thinner.

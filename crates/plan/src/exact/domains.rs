@@ -16,7 +16,8 @@
 //!
 //! [`PieceCosts::narrow`]: crate::PieceCosts::narrow
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::super::key::KeyChoice;
 use super::super::local_cost::{

@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_report::PatchId;
 
 use super::super::space::Space;
 use super::domains::Domains;

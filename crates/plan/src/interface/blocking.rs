@@ -18,10 +18,11 @@
 //! nothing here.
 
 use rayon::prelude::*;
+use shellock_assembly::LatticeDirection;
 use shellock_assembly::push::{self, N_PUSHES};
-use shellock_assembly::{LatticeDirection, PatchId};
 use shellock_geom::Vec3;
 use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
+use shellock_report::PatchId;
 
 use super::sample::{Line, Sample, Way};
 use crate::PlanParams;

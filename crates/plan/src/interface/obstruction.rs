@@ -13,9 +13,10 @@
 //! Round thin limbs, where the far wall is near, little more than the limb's axis remains as a direction.
 //! Limits: only the two pieces of the seam are checked, since the order of the others is not known yet.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 use crate::PlanParams;

@@ -5,8 +5,9 @@
 //! further until no other wall is nearer (below a sharp edge of the model). Lines, frames and rules are those
 //! of the connector stage.
 
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_report::PatchId;
 use shellock_surface::Seam;
 use shellock_surface::seam::rules::{SHARPEST_TURN, SHORTEST_RAIL_SIZES, SHORTEST_RUN_SIZES, end_gap_mm};
 use shellock_surface::seam::{FramedLine, later_is_male};

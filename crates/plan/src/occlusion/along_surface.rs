@@ -6,9 +6,9 @@
 //!   ─────────────┴─────────┤          ─────────────┤
 //! ```
 
-use shellock_assembly::PatchId;
 use shellock_geom::Vec3;
 use shellock_geom::topology::{HalfEdge, Topology};
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 
 use super::Table;

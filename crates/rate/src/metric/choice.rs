@@ -1,7 +1,7 @@
 //! Choice of the strongest plan that the search allows, and its weak places (Sect. 6.2).
 
+use crate::causes::Cause;
 use serde::{Deserialize, Serialize};
-use shellock_assembly::{Cancelled, Cause, Ctx, PatchId, Warning};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
@@ -9,6 +9,7 @@ use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
 };
+use shellock_report::{Cancelled, Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 
 use super::climb::{ClimbError, ClimbParams, Climbed, climb};
@@ -324,11 +325,11 @@ pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> 
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
-    ctx.warn(Warning {
-        cause: Cause::ComesApart,
-        pieces: loose.iter().map(|part| part.piece).collect(),
-        at: loose.first().map(|part| part.at),
-    });
+    ctx.warn(Warning::new(
+        Cause::ComesApart,
+        loose.iter().map(|part| part.piece).collect(),
+        loose.first().map(|part| part.at),
+    ));
 }
 
 fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
@@ -348,24 +349,24 @@ fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
         Failure::PinYields => "pins bend",
         Failure::WallYields => "walls yield",
     };
-    ctx.warn(Warning {
-        cause: Cause::BearsLittle {
+    ctx.warn(Warning::new(
+        Cause::BearsLittle {
             done: weakest.deed.done().to_owned(),
             bears: much(factor),
             asked: much(1.0),
             gives_way: gives_way.to_owned(),
         },
-        pieces: first.between.to_vec(),
-        at: Some(first.at),
-    });
+        first.between.to_vec(),
+        Some(first.at),
+    ));
 }
 
 fn warn_of_loose(ctx: &Ctx<'_>, model: &PlanModel, piece: PatchId) {
-    ctx.warn(Warning {
-        cause: Cause::PieceLoose,
-        pieces: vec![piece],
-        at: Some(middle_of(model, piece).to_array()),
-    });
+    ctx.warn(Warning::new(
+        Cause::PieceLoose,
+        vec![piece],
+        Some(middle_of(model, piece).to_array()),
+    ));
 }
 
 /// The point of `piece` that is nearest to the mean of its points, mm.

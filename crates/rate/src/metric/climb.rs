@@ -14,9 +14,9 @@
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
-use shellock_assembly::{Cancelled, Ctx, PatchId};
 use shellock_geom::sparse::SparseError;
 use shellock_plan::{LatticePlan, Neighbourhood, RankedPlan};
+use shellock_report::{Cancelled, Ctx, PatchId};
 
 use super::rating::{Bench, Rank, Rated};
 

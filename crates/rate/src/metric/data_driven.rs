@@ -11,12 +11,12 @@
 //! piece is held elsewhere. [`pieces_alone`] therefore simulates each piece with its neighbours held. That
 //! metric, too, depends only on the directions on the piece's own boundaries.
 
-use shellock_assembly::PatchId;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Resistance, SurfaceModel};
 use shellock_plan::interface::SeamFrame;
 use shellock_plan::local_tests::LocalTests;
+use shellock_report::PatchId;
 
 use super::PlanModel;
 

@@ -4,9 +4,9 @@
 //! the opening of seams, which are proportional to the load, since contacts have no clearance.
 
 use rayon::prelude::*;
-use shellock_assembly::PatchId;
 use shellock_geom::sparse::SparseError;
 use shellock_geom::{TriMesh, Vec3};
+use shellock_report::PatchId;
 
 use super::rating::{Bench, Rated};
 use super::{LoadBorne, PlanModel};

@@ -16,12 +16,12 @@
 
 use std::collections::BTreeMap;
 
-use shellock_assembly::PatchId;
 use shellock_assembly::motion::{Contact, farthest, most_play};
 use shellock_geom::{Aabb, Vec3};
 use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 use shellock_mechanics::{Meeting, Side};
 use shellock_plan::LatticePlan;
+use shellock_report::PatchId;
 
 use super::PlanModel;
 

@@ -1,7 +1,6 @@
 //! The segmented surface as parts and stations, and the joints that a plan makes of the stations.
 
-use shellock_assembly::params::ParamProblem;
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::remesh::{RemeshParams, Remeshed, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
@@ -10,6 +9,8 @@ use shellock_mechanics::{Material, Meeting, ShellAssembly, Station, SurfaceModel
 use shellock_plan::interface::meeting;
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{LatticePlan, PlanParams};
+use shellock_report::ParamProblem;
+use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
 use shellock_surface::seam::rules::end_gap_mm;
 use shellock_surface::seam::{seam_half_edges, stretches};

@@ -1,10 +1,11 @@
-use shellock_assembly::{Ctx, LatticeDirection, PatchId, Warning};
+use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
 use shellock_mechanics::{Material, Resistance, Side};
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{
     FoundPlan, LatticePlan, LatticeStep, PlanConstraints, PlanOutcome, PlanParams, search, survey,
 };
+use shellock_report::{Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 use shellock_test_surfaces::{label, seams, sphere, voronoi};
 

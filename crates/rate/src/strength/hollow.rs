@@ -31,9 +31,9 @@ const THINNEST_PROPOSED_MM: f64 = 0.8;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "only {:.0} % of the surface has room for a cavity behind walls of {wall_mm:.2} mm: \
-     the model is too thin to be hollow; make it about {size_mm:.0} mm large (--size) \
-     or its walls {better_mm:.2} mm thin (--thickness) at most, \
-     or print it as it is (--allow-thin makes pieces all the same)",
+     the model is too thin to be hollow; make it about {size_mm:.0} mm large, \
+     or its walls {better_mm:.2} mm thin at most, \
+     or print it in one piece (allow-thin makes pieces all the same)",
     100.0 * share
 )]
 pub struct TooThin {
@@ -51,8 +51,8 @@ pub struct TooThin {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "half of the model is no thicker than {thickness_mm:.1} mm, and nowhere is room for connectors \
-     behind walls of {wall_mm:.2} mm: make it about {size_mm:.0} mm large (--size){}, \
-     or print it as it is (--allow-thin makes pieces all the same)",
+     behind walls of {wall_mm:.2} mm: make it about {size_mm:.0} mm large{}, \
+     or print it in one piece (allow-thin makes pieces all the same)",
     thinner(*better_mm)
 )]
 pub struct NoRoom {
@@ -68,9 +68,7 @@ pub struct NoRoom {
 
 /// Proposal of thinner walls, in words; empty if `None`.
 fn thinner(better_mm: Option<f64>) -> String {
-    better_mm.map_or_else(String::new, |mm| {
-        format!(", make its walls {mm:.2} mm thin (--thickness)")
-    })
+    better_mm.map_or_else(String::new, |mm| format!(", make its walls {mm:.2} mm thin"))
 }
 
 /// Checks that connectors have room behind walls of `wall_mm` somewhere; else proposes a size and walls.

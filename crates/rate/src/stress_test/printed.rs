@@ -1,12 +1,12 @@
 //! Stress tests of the pieces as they are printed: their finished meshes with their gaps.
 
-use shellock_assembly::{Ctx, PatchId};
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Solid, Vec3};
 use shellock_mechanics::connector::PIN_DEPTH;
 use shellock_mechanics::solid::{Answer, Hold, Moved, Push, SolidError, SolidModel, SolidParams, Spot};
 use shellock_mechanics::{Meeting, StressLevel};
 use shellock_plan::LatticePlan;
+use shellock_report::{Ctx, PatchId};
 use shellock_surface::SegmentedSurface;
 
 use super::{

@@ -13,7 +13,7 @@ use crate::metric::{Deformed, DeformedLoad, GivesWay, Holding, LoadBorne, LooseP
 use crate::piece::{Finished, FinishedJoint};
 use crate::plan::{LatticePlan, PlanProof, ProofScope};
 use crate::{
-    Cause, ConnectorSizes, Direction, IdVec, InstallationPlan, PatchId, PressFit, SegmentedSurface, Warning,
+    ConnectorSizes, Direction, IdVec, InstallationPlan, PatchId, PressFit, SegmentedSurface, Warning,
 };
 
 /// Map from the turned model and its patches to the model as given and the pieces of the kit.
@@ -201,50 +201,7 @@ impl Handover {
     }
 
     pub fn warnings(&self, warnings: Vec<Warning>) -> Vec<Warning> {
-        let told = |w: Warning| {
-            let mut pieces = self.all(&w.pieces);
-            if matches!(
-                w.cause,
-                Cause::ShortContacts { .. }
-                    | Cause::WeakGraph
-                    | Cause::ComesApart
-                    | Cause::PieceWithoutNumber
-            ) {
-                // The order of the pieces means nothing here, so list them by number.
-                pieces.sort_unstable();
-            }
-            Warning {
-                cause: self.cause(w.cause),
-                pieces,
-                at: w.at.map(|at| self.at(at)),
-            }
-        };
+        let told = |w: Warning| w.renumber(&|piece| self.piece(piece)).move_by(|at| self.at(at));
         warnings.into_iter().map(told).collect()
-    }
-
-    /// Converts causes that name pieces of their own.
-    fn cause(&self, cause: Cause) -> Cause {
-        match cause {
-            Cause::LabelsDivided { into } => Cause::LabelsDivided {
-                into: into
-                    .into_iter()
-                    .map(|(label, pieces)| (label, self.all(&pieces)))
-                    .collect(),
-            },
-            Cause::ConnectorLimited {
-                pair,
-                by,
-                wanted_mm,
-                given_mm,
-                n_others,
-            } => Cause::ConnectorLimited {
-                pair: pair.map(|p| self.piece(p)),
-                by,
-                wanted_mm,
-                given_mm,
-                n_others,
-            },
-            other => other,
-        }
     }
 }

@@ -3,6 +3,7 @@
 use shellock_geom::{Aabb, Solid, TriMesh};
 
 use super::agenda::Grade;
+use super::causes::Cause;
 use super::division::Division;
 use super::handover::Handover;
 use super::{DesignError, Params, Settings};
@@ -16,8 +17,7 @@ use crate::play::{self, KitPlay, Rattle};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
 use crate::{
-    Cause, ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, body, connector,
-    piece,
+    ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, body, connector, piece,
 };
 
 /// Finished pieces of a plan, with their verification and measurements. Places and directions are in the
@@ -276,25 +276,25 @@ fn judged(
 fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
     let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
     for d in of(PressFitKind::Detent) {
-        ctx.warn(Warning {
-            cause: Cause::Detent {
+        ctx.warn(Warning::new(
+            Cause::Detent {
                 interference_mm: d.interference_mm,
                 travel_mm: d.travel_mm,
             },
-            pieces: vec![d.piece],
-            at: Some(d.at),
-        });
+            vec![d.piece],
+            Some(d.at),
+        ));
     }
     if let Some(rib) = of(PressFitKind::Rib).next() {
-        ctx.warn(Warning {
-            cause: Cause::KeyRibs {
+        ctx.warn(Warning::new(
+            Cause::KeyRibs {
                 n: of(PressFitKind::Rib).count(),
                 interference_mm: rib.interference_mm,
                 travel_mm: rib.travel_mm,
             },
-            pieces: vec![rib.piece],
-            at: Some(rib.at),
-        });
+            vec![rib.piece],
+            Some(rib.at),
+        ));
     }
 }
 
@@ -305,13 +305,13 @@ fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], 
         let pair = [contact.later, contact.earlier];
         let joins = |j: &&FinishedJoint| pair.contains(&j.male) && pair.contains(&j.female);
         if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
-            ctx.warn(Warning {
-                cause: Cause::SeamWithoutConnector {
+            ctx.warn(Warning::new(
+                Cause::SeamWithoutConnector {
                     length_mm: contact.length_mm,
                 },
-                pieces: pair.to_vec(),
-                at: Some(contact.at.to_array()),
-            });
+                pair.to_vec(),
+                Some(contact.at.to_array()),
+            ));
         }
     }
 }

@@ -7,6 +7,7 @@ use shellock_geom::TriMesh;
 use super::agenda::{Agenda, Effort, Grade};
 use super::attempt::Failure;
 use super::candidate;
+use super::causes::Cause;
 use super::wall::Wall;
 use super::ways::Input;
 use super::{KeySource, Kit, Planned, Settings};
@@ -21,7 +22,7 @@ use crate::strength::{NoRoom, Strength, StrengthError, TooThin};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
-use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
+use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// Finished kit and the wall that it is made of. Places are in the space of the model as given.
 #[non_exhaustive]
@@ -378,20 +379,12 @@ fn key_warning(
 /// Warns that an uncut piece became the key, with the reasons.
 fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     let key = kit.plan.key();
-    Warning {
-        cause: Cause::KeyNotCut { reasons },
-        pieces: vec![key],
-        at: None,
-    }
+    Warning::new(Cause::KeyNotCut { reasons }, vec![key], None)
 }
 
 /// Warns that the time was over after so many kits; after none, the warning speaks of the plan.
 pub(super) fn time_up(kits: usize) -> Warning {
-    Warning {
-        cause: Cause::TimeUp { kits },
-        pieces: Vec::new(),
-        at: None,
-    }
+    Warning::new(Cause::TimeUp { kits }, Vec::new(), None)
 }
 
 /// Reason why there is no kit where the time was over: the time that the first one needs, and what failed so
@@ -403,19 +396,19 @@ pub(super) fn report_lateness(reason: &str, needed_s: Option<f64>) -> String {
         format!("; a kit takes about {:.0} s", (s / STEP_S).ceil() * STEP_S)
     });
     match reason {
-        "" => format!("the time was over before a kit was made (--time){needed}"),
-        reason => format!("the time was over before a kit was made (--time){needed}; so far {reason}"),
+        "" => format!("the time was over before a kit was made{needed}"),
+        reason => format!("the time was over before a kit was made{needed}; so far {reason}"),
     }
 }
 
 /// Warns that a cut key has no rails.
 fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
     let key = kit.plan.key();
-    Warning {
-        cause: Cause::KeyWithoutRails,
-        pieces: vec![key],
-        at: Some(site.prism.origin.to_array()),
-    }
+    Warning::new(
+        Cause::KeyWithoutRails,
+        vec![key],
+        Some(site.prism.origin.to_array()),
+    )
 }
 
 /// Warns of pieces with sheets that may break off or slots that may fuse.
@@ -423,21 +416,20 @@ fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
     let all = || thin.as_slice().iter().flatten();
     let longest = all().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
     let n_sheets = all().filter(|place| place.kind == ThinKind::Sheet).count();
-    Some(Warning {
-        cause: Cause::ThinPlaces {
+    Some(Warning::new(
+        Cause::ThinPlaces {
             n_sheets,
             n_slots: all().count() - n_sheets,
             longest_mm: longest.length_mm,
             thickness_mm: longest.thickness_mm,
             is_slot: longest.kind == ThinKind::Slot,
         },
-        pieces: thin
-            .iter()
+        thin.iter()
             .filter(|(_, places)| !places.is_empty())
             .map(|(p, _)| p)
             .collect(),
-        at: Some(longest.at),
-    })
+        Some(longest.at),
+    ))
 }
 
 impl PrintedFit {
@@ -489,13 +481,15 @@ fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
         .min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
     let place = deepest.overall;
     let is_meant = deepest.piece == kit.plan.key() && !kit.press_fits.is_empty();
-    (place.gap_mm < -LEAST_MM && !is_meant).then(|| Warning {
-        cause: Cause::SurfacesCross {
-            by_mm: -place.gap_mm,
-            after_mm: place.travel_mm,
-        },
-        pieces: vec![deepest.piece, deepest.against],
-        at: Some(place.at),
+    (place.gap_mm < -LEAST_MM && !is_meant).then(|| {
+        Warning::new(
+            Cause::SurfacesCross {
+                by_mm: -place.gap_mm,
+                after_mm: place.travel_mm,
+            },
+            vec![deepest.piece, deepest.against],
+            Some(place.at),
+        )
     })
 }
 
@@ -527,10 +521,10 @@ pub enum DesignError {
     #[error(transparent)]
     NoRoom(#[from] NoRoom),
     /// No triangle has the label that the key is to have.
-    #[error("no part of the model has the label {0}, which the key is to have (--key)")]
+    #[error("no part of the model has the label {0}, which the key is to have")]
     NoLabelOfKey(i64),
     /// No piece has the number that the key is to have.
-    #[error("there is no piece {0} to be the key (--key): the model is divided into pieces 1 to {1}")]
+    #[error("there is no piece {0} to be the key: the model is divided into pieces 1 to {1}")]
     NoPieceOfKey(i64, usize),
     /// The user asked to stop.
     #[error(transparent)]

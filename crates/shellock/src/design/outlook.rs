@@ -244,7 +244,8 @@ mod tests {
         labels[far] = labels[lowest.expect("it has triangles")];
         let solid = Solid::new(ball.mesh).unwrap();
         let outlook = outlook(&Ctx::quiet(), &Params::default(), &solid, Some(&labels), None).unwrap();
-        let islands = |w: &&Warning| matches!(w.cause, crate::Cause::LabelIslands { n: 1, .. });
+        let islands =
+            |w: &&Warning| matches!(w.cause(), Some(crate::causes::Divide::LabelIslands { n: 1, .. }));
         assert_eq!(
             outlook.warnings.iter().filter(islands).count(),
             1,

@@ -6,6 +6,7 @@
 use super::DesignError;
 use super::agenda::{Allowance, Permit, Step};
 use super::attempt::Planning;
+use super::causes::Cause;
 use super::division::Division;
 use super::trial::Change;
 use super::wall::Thicker;
@@ -13,7 +14,7 @@ use crate::handling::Handling;
 use crate::metric::{ChoiceError, Holding, LoadBorne, bears_with};
 use crate::plan::{PlanParams, RankedPlan};
 use crate::sizes::ChosenSizes;
-use crate::{Cause, Ctx, PatchId, Warning, segmentation, strength};
+use crate::{Ctx, PatchId, Warning, segmentation, strength};
 
 /// Changes aim at the load factor that is asked plus this, since they lead to another plan.
 const AIM: f64 = 0.1;
@@ -206,13 +207,13 @@ fn join(
     };
     let params = &division.settings.segmentation;
     let united = segmentation::unite_two(&ctx.fork(), params, &division.surface, first.between)?;
-    let warning = Warning {
-        cause: Cause::JoinedForUse {
+    let warning = Warning::new(
+        Cause::JoinedForUse {
             done: weakest.deed.done().to_owned(),
         },
-        pieces: Vec::new(),
-        at: Some(first.at),
-    };
+        Vec::new(),
+        Some(first.at),
+    );
     Ok(united.map(|surface| Change::Divide(Step::JoinWeak, surface, Some(warning))))
 }
 

@@ -13,9 +13,9 @@ use super::handover::Handover;
 use super::lesson::{Lesson, lessons};
 use super::trial::Job;
 use super::*;
+use crate::Progress;
 use crate::body::BodyError;
 use crate::connector::SeamRoom;
-use crate::context::Progress;
 use crate::key::{KeyPrism, KeySite, Turn};
 use crate::metric::ChoiceError;
 use crate::piece::PieceError;
@@ -23,7 +23,7 @@ use crate::plan::PlanConstraints;
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
 use crate::verify::Finding;
-use crate::{Cancelled, Cause, LatticeDirection, PatchId};
+use crate::{Cancelled, LatticeDirection, PatchId};
 
 #[test]
 fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
@@ -90,11 +90,11 @@ fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
 fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches() {
     let turn = Turn::laying(Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)).0;
     let handover = Handover::new(&turn, found_plan([2, 0, 1]));
-    let told = handover.warnings(vec![Warning {
-        cause: Cause::SeamWithoutConnector { length_mm: 9.0 },
-        pieces: vec![PatchId(2), PatchId(1)],
-        at: Some(turn.apply(Vec3::X).to_array()),
-    }]);
+    let told = handover.warnings(vec![Warning::new(
+        crate::causes::Design::SeamWithoutConnector { length_mm: 9.0 },
+        vec![PatchId(2), PatchId(1)],
+        Some(turn.apply(Vec3::X).to_array()),
+    )]);
     assert_eq!(told[0].pieces, [PatchId(0), PatchId(2)]);
     assert!(Vec3::from(told[0].at.unwrap()).distance(Vec3::X) < 1e-12);
     let plan = handover.plan();
@@ -316,7 +316,7 @@ fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
 #[test]
 fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_kept() {
     let mut other = loose(1);
-    other.warnings[0].cause = Cause::KeyWithoutRibs;
+    other.warnings[0] = Warning::new(crate::causes::Make::KeyWithoutRibs, Vec::new(), None);
     let design = Ball::new().design(vec![(Some(site()), Ok(other)), (None, Ok(good()))]);
     let all = codes(&design);
     for code in ["key-without-grip", "strength-unknown", "key-not-cut"] {
@@ -407,7 +407,7 @@ fn pieces_that_are_not_divided_again_for_want_of_time_are_reported() {
             Ok(DesignOutcome::NoPlan {
                 is_cut_short, reason, ..
             }) => {
-                assert_eq!(reason.contains("(--time)"), is_cut_short, "{reason}");
+                assert_eq!(reason.contains("the time was over"), is_cut_short, "{reason}");
                 is_cut_short
             }
             _ => panic!("two halves never lock"),

@@ -1,9 +1,10 @@
 //! The wall of a kit: as thick as a fall asks for, thicker for the sake of use, or as thin as walls are made.
 
+use super::causes::Cause;
 use super::ways::{Input, Way};
 use super::{DesignError, Params, Settings, Thickness};
 use crate::strength::{self, Strength, StrengthError};
-use crate::{Cause, Ctx, Warning};
+use crate::{Ctx, Warning};
 
 /// Thickness of the wall in the stages' settings, and the facts that led to it.
 #[derive(Clone)]
@@ -129,11 +130,7 @@ impl Wall {
 
     /// Warnings that follow from the facts.
     pub fn warnings(&self) -> Vec<Warning> {
-        let of_model = |cause| Warning {
-            cause,
-            pieces: Vec::new(),
-            at: None,
-        };
+        let of_model = |cause| Warning::new(cause, Vec::new(), None);
         let params = &self.settings.strength;
         let mut warnings = self.strength.as_ref().map_or(Vec::new(), |s| s.warnings(params));
         warnings.extend(self.error.iter().map(|error| {

@@ -3,7 +3,7 @@
 //! A plan can lock all pieces only if this graph is 2-connected. If one piece separates a set S from the key,
 //! every joint between S and the rest slides along that piece's direction, and S leaves as one cluster.
 
-use shellock_assembly::PatchId;
+use shellock_report::PatchId;
 
 /// Two patches that share a seam.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! Seams as chains of edges between patches.
 
-use shellock_assembly::PatchId;
 use shellock_geom::topology::ends;
 use shellock_geom::{HalfEdge, Topology, TriMesh, Vec3};
+use shellock_report::PatchId;
 
 use crate::seam::graph::ContactGraph;
 use crate::{Seam, SegmentedSurface};

@@ -1,6 +1,7 @@
-use shellock_assembly::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
 use shellock_plan::LatticeStep;
 use shellock_rate::stress_test::{FRICTION, Printed, StressReport, chart};
+use shellock_report::PatchId;
 use shellock_test_surfaces::{label, sphere};
 
 use super::*;

@@ -2,6 +2,7 @@
 
 use shellock_geom::{TriMesh, Vec3};
 
+use crate::causes::Make;
 use crate::design::Kit;
 use crate::design::handover::Handover;
 use crate::key::Turn;
@@ -10,7 +11,7 @@ use crate::plan::key::KeyDirections;
 use crate::plan::{LatticePlan, PlanProof, ProofScope};
 use crate::play::{KitPlay, Rattle, Slide};
 use crate::verify::{Check, Finding, Play, Verification};
-use crate::{Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, Warning};
+use crate::{ConnectorSizes, IdVec, LatticeDirection, PatchId, Warning};
 
 pub const N: usize = 3;
 
@@ -100,11 +101,7 @@ pub fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Fi
             together: None,
             proofs: Vec::new(),
         },
-        warnings: vec![Warning {
-            cause: Cause::KeyWithoutGrip,
-            pieces: Vec::new(),
-            at: None,
-        }],
+        warnings: vec![Warning::new(Make::KeyWithoutGrip, Vec::new(), None)],
         handover,
     }
 }

@@ -1,0 +1,73 @@
+//! Causes of warnings about the input and the output of a job.
+
+use shellock::{Diagnostic, PatchId, Told};
+use shellock_report::words::{pieces as named, plural};
+
+/// Cause of a warning, with its figures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cause {
+    /// A remark on the model's file, in the words of the program that read it.
+    Input {
+        /// Stable name of the remark for machines.
+        code: &'static str,
+        /// Sentence for people.
+        sentence: String,
+    },
+    /// Some pieces are larger than the plate of the printer.
+    PieceTooLarge {
+        /// Name and size of the printer.
+        printer: String,
+    },
+    /// A check of the kit failed.
+    Failed {
+        /// Finding of the check, in words.
+        finding: String,
+    },
+}
+
+impl Diagnostic for Cause {
+    fn tell(&self, pieces: &[PatchId]) -> Told {
+        match self {
+            Self::Input { code, sentence } => Told::warning(code, sentence.clone()),
+            Self::PieceTooLarge { printer } => Told::problem(
+                "piece-too-large",
+                format!(
+                    "{} {} not fit the printer {printer} and {} left out of plates.3mf: make more pieces, or \
+                     choose another printer",
+                    named(pieces),
+                    plural(pieces.len(), "does", "do"),
+                    plural(pieces.len(), "is", "are"),
+                ),
+            )
+            .by(&["pieces", "printer"]),
+            Self::Failed { finding } => Told::problem("failed", format!("do not print this kit: {finding}")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_report::LONGEST_SENTENCE;
+
+    use super::*;
+
+    #[test]
+    fn sentences_can_be_read_at_once() {
+        let pieces = [PatchId(11), PatchId(6)];
+        for cause in [
+            Cause::PieceTooLarge {
+                printer: "\"fdm\" (256 × 256 × 256 mm)".into(),
+            },
+            Cause::Failed {
+                finding: "piece 3 is not closed".into(),
+            },
+        ] {
+            let sentence = cause.tell(&pieces).sentence;
+            let n = sentence.chars().count();
+            assert!(
+                n <= LONGEST_SENTENCE && !sentence.contains('\n'),
+                "{n}: {sentence}"
+            );
+        }
+    }
+}
