@@ -3,16 +3,19 @@
 use shellock::design::{Design, Settings};
 use shellock::verify::Verification;
 use shellock::verify::words::PlaceWords;
-use shellock::{Warning, play};
+use shellock::{Severity, Warning, play};
 use shellock_job::bears_lines;
 use shellock_job::input::Model;
 use shellock_job::output::{Destination, Summary};
 use shellock_job::place::Standing;
 use shellock_job::printing::Printing;
-use shellock_job::told::{bearing, fits, quality, tried, warning_lines, weakest};
+use shellock_job::told::{bearing, fits, quality, tried, weakest};
 
 use crate::Session;
 use crate::progress::Shown;
+
+/// Number of warnings and notes that the short report shows; it shows all problems.
+const MOST_TOLD: usize = 5;
 
 /// A finished kit, with everything that its report needs.
 pub struct Finished<'a> {
@@ -86,6 +89,41 @@ impl Finished<'_> {
         );
         println!("{}", tried(&made.effort));
     }
+}
+
+/// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
+fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
+    let ranked = Warning::ranked(warnings);
+    let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
+    let n_told = if is_verbose {
+        ranked.len()
+    } else {
+        n_problems.max(MOST_TOLD).min(ranked.len())
+    };
+    let line = |w: &Warning| {
+        let place =
+            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
+        format!("{}: {w}{place}", w.severity())
+    };
+    let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
+    let n_notes = ranked[n_told..]
+        .iter()
+        .filter(|w| w.severity() == Severity::Note)
+        .count();
+    let counted = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {what}")),
+        n => Some(format!("{n} {what}s")),
+    };
+    let rest = [
+        counted(ranked.len() - n_told - n_notes, "warning"),
+        counted(n_notes, "note"),
+    ];
+    let rest: Vec<String> = rest.into_iter().flatten().collect();
+    if !rest.is_empty() {
+        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
+    }
+    lines
 }
 
 /// Prints warnings on how the model's file was read, before anything else. They go to standard output, or to
