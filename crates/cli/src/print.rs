@@ -3,16 +3,19 @@
 use shellock::design::{Design, Settings};
 use shellock::verify::Verification;
 use shellock::verify::words::PlaceWords;
-use shellock::{Warning, play};
+use shellock::{Severity, Warning, WarningEntry, play};
 use shellock_job::bears_lines;
 use shellock_job::input::Model;
 use shellock_job::output::{Destination, Summary};
 use shellock_job::place::Standing;
 use shellock_job::printing::Printing;
-use shellock_job::told::{bearing, fits, quality, tried, warning_lines, weakest};
+use shellock_job::told::{bearing, fits, quality, tried, weakest};
 
 use crate::Session;
 use crate::progress::Shown;
+
+/// Number of warnings and notes that the short report shows; it shows all problems.
+const MOST_TOLD: usize = 5;
 
 /// A finished kit, with everything that its report needs.
 pub struct Finished<'a> {
@@ -88,6 +91,42 @@ impl Finished<'_> {
     }
 }
 
+/// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
+fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
+    let ranked = Warning::ranked(warnings);
+    let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
+    let n_told = if is_verbose {
+        ranked.len()
+    } else {
+        n_problems.max(MOST_TOLD).min(ranked.len())
+    };
+    let line = |w: &Warning| {
+        let place =
+            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
+        let sentence = WarningEntry::from(w.clone()).sentence_with(|name| format!("--{name}"));
+        format!("{}: {sentence}{place}", w.severity())
+    };
+    let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
+    let n_notes = ranked[n_told..]
+        .iter()
+        .filter(|w| w.severity() == Severity::Note)
+        .count();
+    let counted = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {what}")),
+        n => Some(format!("{n} {what}s")),
+    };
+    let rest = [
+        counted(ranked.len() - n_told - n_notes, "warning"),
+        counted(n_notes, "note"),
+    ];
+    let rest: Vec<String> = rest.into_iter().flatten().collect();
+    if !rest.is_empty() {
+        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
+    }
+    lines
+}
+
 /// Prints warnings on how the model's file was read, before anything else. They go to standard output, or to
 /// standard error in quiet mode. With JSON they are part of the result instead.
 pub fn print_input_warnings(session: &Session, model: &Model) {
@@ -102,7 +141,7 @@ pub fn print_input_warnings(session: &Session, model: &Model) {
 
 /// Prints the [`warning_lines`] on standard output.
 pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standing) {
-    warning_lines(warnings, session.is_verbose, standing, |name| format!("--{name}"))
+    warning_lines(warnings, session.is_verbose, standing)
         .iter()
         .for_each(|line| println!("{line}"));
 }

@@ -39,7 +39,7 @@ impl Display {
             is_terminal: std::io::stderr().is_terminal(),
             shown,
             since: Instant::now(),
-            watch: Stopwatch::new(),
+            watch: Stopwatch::start(),
             course: None,
         }
     }
@@ -47,7 +47,7 @@ impl Display {
     /// Creates a display for a kit, whose stages are counted.
     pub fn of_kit(shown: Shown) -> Self {
         Self {
-            course: Some(Mutex::new(Course::new())),
+            course: Some(Mutex::new(Course::default())),
             ..Self::new(shown)
         }
     }

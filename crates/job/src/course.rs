@@ -39,7 +39,7 @@ pub struct Stand {
 }
 
 /// Progress of a job. A kit that fails begins again at an earlier stage.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Course {
     /// Start time and first stage of the current kit.
     begun: Option<(Instant, usize)>,
@@ -47,11 +47,6 @@ pub struct Course {
 }
 
 impl Course {
-    /// Creates the course of a job that has not begun.
-    pub fn new() -> Self {
-        Self { begun: None, at: 0 }
-    }
-
     /// Records that the stage `name` begins; `None` if it is not a stage of a kit.
     pub fn begin(&mut self, name: &str, now: Instant) -> Option<Stand> {
         let index = STAGES.iter().position(|(n, _)| *n == name)?;
@@ -95,7 +90,7 @@ mod tests {
 
     #[test]
     fn the_time_left_is_told_by_what_was_done_of_this_kit() {
-        let (mut course, start) = (Course::new(), Instant::now());
+        let (mut course, start) = (Course::default(), Instant::now());
         let after = |s: f64| start + Duration::from_secs_f64(s);
         let first = course.begin("thickness", after(0.0)).unwrap();
         assert_eq!((first.number, first.of, first.left), (1, STAGES.len(), None));

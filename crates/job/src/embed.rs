@@ -129,7 +129,7 @@ pub fn design(
     let options = request.options;
     let params = checked(options)?;
     let model = input::simple(&session, model(request)?, options)?;
-    let course = Mutex::new(Course::new());
+    let course = Mutex::new(Course::default());
     let made =
         Begun::new(&session, &model, options, &params)?.made(&session, &|p| tell(&course, news, &p))?;
     Ok(Kit {
@@ -157,7 +157,7 @@ pub fn segment(
     let session = Session::silent(stop);
     checked(request.options)?;
     let model = model(request)?;
-    let course = Mutex::new(Course::new());
+    let course = Mutex::new(Course::default());
     let report = |p: Progress<'_>| tell(&course, news, &p);
     let surface = division::divided(&session, &Ctx::new(&report, stop), &model, request.options)?;
     Ok(division::labels_of_file(&model, &surface))

@@ -31,7 +31,7 @@ struct State {
 
 impl Stopwatch {
     /// Starts with a stage of its own, "begin", for the time before the first stage.
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         let mut state = State {
             stages: Vec::new(),
             current: 0,
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn rounds_of_one_stage_add_up() {
-        let watch = Stopwatch::new();
+        let watch = Stopwatch::start();
         for name in ["plan", "pieces", "plan"] {
             watch.begin(name);
         }

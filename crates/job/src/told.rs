@@ -5,12 +5,8 @@ use shellock::metric::Holding;
 use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
-use shellock::{Severity, Warning, WarningEntry};
 
 use crate::place::Standing;
-
-/// Number of warnings and notes that the short report shows; it shows all problems.
-const MOST_TOLD: usize = 5;
 
 /// Lists what was tried, in order.
 pub fn tried(effort: &Effort) -> String {
@@ -143,46 +139,4 @@ pub fn fits(made: &Design) -> Option<String> {
         "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is \
          {least_mm:.2} mm){thin}"
     ))
-}
-
-/// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
-/// `spell` writes a setting as the interface calls it.
-pub fn warning_lines(
-    warnings: &[Warning],
-    is_verbose: bool,
-    standing: &Standing,
-    spell: impl Fn(&str) -> String,
-) -> Vec<String> {
-    let ranked = Warning::ranked(warnings);
-    let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
-    let n_told = if is_verbose {
-        ranked.len()
-    } else {
-        n_problems.max(MOST_TOLD).min(ranked.len())
-    };
-    let line = |w: &Warning| {
-        let place =
-            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
-        let sentence = WarningEntry::from(w.clone()).sentence_with(&spell);
-        format!("{}: {sentence}{place}", w.severity())
-    };
-    let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
-    let n_notes = ranked[n_told..]
-        .iter()
-        .filter(|w| w.severity() == Severity::Note)
-        .count();
-    let counted = |n: usize, what: &str| match n {
-        0 => None,
-        1 => Some(format!("1 {what}")),
-        n => Some(format!("{n} {what}s")),
-    };
-    let rest = [
-        counted(ranked.len() - n_told - n_notes, "warning"),
-        counted(n_notes, "note"),
-    ];
-    let rest: Vec<String> = rest.into_iter().flatten().collect();
-    if !rest.is_empty() {
-        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
-    }
-    lines
 }

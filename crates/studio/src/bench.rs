@@ -3,7 +3,6 @@
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,14 +11,14 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use serde_json::{Map, Value, json};
 use shellock::design::{Settings, first_division};
 use shellock::segmentation::{self, MOST_PIECES};
-use shellock::{Ctx, SegmentedSurface, figure::Figure as Sample};
+use shellock::{Ctx, figure::Figure as Sample};
 use shellock_formats::{Loaded, write_stl_binary};
 use shellock_geom::Vec3;
 use shellock_job::bed::fitted;
 use shellock_job::build::checked;
 use shellock_job::input::{read, shellock_figure};
 use shellock_job::options::{Choice, Choices, Offer, changed, offers, relabelled};
-use shellock_job::output::{lying, standing};
+use shellock_job::output::lying;
 use shellock_job::project::ModelOf;
 use shellock_job::{Failure, Options, Session, child, config};
 use shellock_print::Printer;
@@ -29,7 +28,8 @@ use crate::finer::{self, finer};
 use crate::jobs::Maker;
 use crate::judgement::{Judged, judge};
 use crate::kit;
-use crate::messages::{Divided, Division, Judgement, MadeKit, Model, Project};
+use crate::messages::{Divided, Division, Judgement, MadeKit, Project};
+use crate::pieces::{Pieces, successor};
 use crate::refusal::Refusal;
 use crate::store::{Found, N_LABELS, Store};
 
@@ -97,40 +97,6 @@ impl State {
         let mesh = model.solid.mesh();
         let new_label = |label| successor(label, &before, &after, |face| mesh.face_area(face));
         Some(relabelled(&self.choices, new_label))
-    }
-}
-
-/// Label in `after` with most of the area of the faces labelled `label` in `before`; `None` if there are
-/// none.
-fn successor(label: i64, before: &[i64], after: &[i64], area: impl Fn(usize) -> f64) -> Option<i64> {
-    let mut areas: BTreeMap<i64, f64> = BTreeMap::new();
-    for (face, _) in before.iter().enumerate().filter(|(_, of)| **of == label) {
-        *areas.entry(after[face]).or_default() += area(face);
-    }
-    let largest = areas.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    largest.map(|(label, _)| label)
-}
-
-/// Pieces as the page shows them.
-#[derive(Clone)]
-pub struct Pieces {
-    /// Labels from 0, one for each triangle that is shown.
-    pub labels: Arc<Vec<u32>>,
-    /// True if a person changed the pieces; otherwise `build` divides by itself.
-    pub is_painted: bool,
-    /// Division that the pieces show; `None` once the options would give another.
-    pub divided: Option<Arc<SegmentedSurface>>,
-    notes: Vec<String>,
-}
-
-impl Pieces {
-    fn n(&self) -> usize {
-        self.labels.iter().collect::<BTreeSet<_>>().len()
-    }
-
-    /// Piece number of each triangle, from 1, as in the files and for people.
-    fn numbers(&self) -> Vec<i64> {
-        self.labels.iter().map(|&label| i64::from(label) + 1).collect()
     }
 }
 
@@ -223,7 +189,7 @@ impl Bench {
         let labels = painted.and_then(|labels| figure.shown_labels(&labels));
         (state.problem, state.model) = (None, Some(model));
         state.figure = Some(Arc::new(figure));
-        state.pieces = labels.map(painted_by_hand);
+        state.pieces = labels.map(Pieces::painted_by_hand);
         self.changed(&mut state)
     }
 
@@ -329,7 +295,7 @@ impl Bench {
         let state = self.lock();
         let model = state.figure.as_ref().map(|figure| {
             let finer = state.model.as_ref().and_then(|of| finer::note(&of.file));
-            told_model(figure, finer, &state.options)
+            figure.told(finer, state.options.up)
         });
         let division = state.pieces.as_ref().map(|pieces| Division {
             n_pieces: pieces.n(),
@@ -390,7 +356,7 @@ impl Bench {
                 .map(|(before, pieces)| before.file_labels(&pieces.labels));
             state.pieces = of_file
                 .and_then(|labels| next.shown_labels(&labels))
-                .map(painted_by_hand);
+                .map(Pieces::painted_by_hand);
             state.figure = Some(Arc::new(next));
         }
         self.changed(&mut state)
@@ -472,7 +438,7 @@ impl Bench {
             .unwrap_or_else(|| painted.clone());
         // A face of the file belongs to one piece only.
         let is_changed = kept != painted;
-        let told = self.set_pieces(of.revision, painted_by_hand(kept))?;
+        let told = self.set_pieces(of.revision, Pieces::painted_by_hand(kept))?;
         Ok(Divided {
             is_changed: Some(is_changed),
             ..told
@@ -524,7 +490,7 @@ impl Bench {
                 self.lock().judged.clone().ok_or_else(Refusal::overtaken)?
             }
         };
-        self.set_pieces(revision, painted_by_hand(judged.mended.clone()))
+        self.set_pieces(revision, Pieces::painted_by_hand(judged.mended.clone()))
     }
 
     /// Divides both sides of a symmetric model alike.
@@ -535,7 +501,7 @@ impl Bench {
         let labels = segmentation::mirrored_labels(&params, &of.figure.model.solid, &of.pieces()?.labels);
         let labels =
             labels.ok_or_else(|| Refusal::wrong("the model is not the same on both sides of any plane"))?;
-        self.set_pieces(of.revision, painted_by_hand(labels))
+        self.set_pieces(of.revision, Pieces::painted_by_hand(labels))
     }
 
     /// Requests a key near the place `at`, mm.
@@ -587,35 +553,10 @@ fn chosen(choices: &[(String, Choice)], own_printers: &[Printer]) -> Result<Opti
     Options::chosen(&of_kit, own_printers)
 }
 
-/// Describes an open model; `finer` is a note on triangles that were divided.
-fn told_model(figure: &Figure, finer: Option<String>, options: &Options) -> Model {
-    let model = &figure.model;
-    let size = standing(options.up, model.solid.mesh().bounds().size()).abs();
-    Model {
-        name: model.name.clone(),
-        n_triangles: figure.n_faces(),
-        size_mm: size.to_array(),
-        notes: finer.into_iter().chain(model.notes.clone()).collect(),
-        warnings: figure.warnings.clone(),
-        thin_share: figure.thin_share(),
-        view_triangles: figure.n_faces(),
-        is_exact: figure.is_exact(),
-    }
-}
-
 /// `words` without the path of `folder` before the names of files in it, which ends in this system's
 /// separator.
 fn without_folder(words: &str, folder: &Path) -> String {
     words.replace(&folder.join("").display().to_string(), "")
-}
-
-fn painted_by_hand(labels: Vec<u32>) -> Pieces {
-    Pieces {
-        labels: Arc::new(labels),
-        is_painted: true,
-        divided: None,
-        notes: Vec::new(),
-    }
 }
 
 /// Divides the model as `segment` would.

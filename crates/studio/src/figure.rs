@@ -15,6 +15,8 @@ use shellock_job::shape::{shape_warnings, wall_mm};
 use shellock_job::shares::largest_shares;
 use shellock_job::{Failure, Options, Session};
 
+use crate::messages;
+
 /// First bytes of a mesh for the page: "SHMV", then the version.
 const MAGIC: u32 = 0x564d_4853;
 const VERSION: u32 = 1;
@@ -55,6 +57,22 @@ impl Figure {
             full,
             is_thin,
         })
+    }
+
+    /// Describes the model for the page; `finer` is a note on triangles that were divided.
+    pub fn told(&self, finer: Option<String>, up: Axis) -> messages::Model {
+        let model = &self.model;
+        let size = standing(up, model.solid.mesh().bounds().size()).abs();
+        messages::Model {
+            name: model.name.clone(),
+            n_triangles: self.n_faces(),
+            size_mm: size.to_array(),
+            notes: finer.into_iter().chain(model.notes.clone()).collect(),
+            warnings: self.warnings.clone(),
+            thin_share: self.thin_share(),
+            view_triangles: self.n_faces(),
+            is_exact: self.is_exact(),
+        }
     }
 
     /// Number of triangles that are shown.

@@ -15,9 +15,9 @@ use shellock_job::{Failure, Options, Session};
 use shellock_print::plates::{fits, fits_whole};
 
 use crate::advice;
-use crate::bench::Pieces;
 use crate::figure::{Figure, shown};
 use crate::messages::{Advice, Blocker, Judgement, Key, ToldPiece};
+use crate::pieces::Pieces;
 
 /// Distance of the outlines of keys from the surface, mm.
 const OFF_MM: f64 = 0.6;

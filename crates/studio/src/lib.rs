@@ -20,6 +20,7 @@ mod judgement;
 mod kit;
 mod messages;
 mod page;
+mod pieces;
 mod refusal;
 mod routes;
 mod store;

@@ -50,14 +50,6 @@ fn a_key_that_the_models_own_labels_name_is_the_same_after_painting_and_back() {
 }
 
 #[test]
-fn the_successor_of_a_label_has_most_of_its_area() {
-    let areas = [1.0, 5.0, 2.0, 2.0, 9.0];
-    let (before, after) = ([7, 7, 7, 7, 8], [1, 2, 3, 3, 1]);
-    let of = |label| successor(label, &before, &after, |face| areas[face]);
-    assert_eq!((of(7), of(8), of(9)), (Some(2), Some(1), None));
-}
-
-#[test]
 fn messages_for_the_page_name_files_without_their_folder() {
     let folder: PathBuf = ["some", "project"].iter().collect();
     let failure = Failure::Wrong(format!("{}: not closed", folder.join("ring.ply").display()));
