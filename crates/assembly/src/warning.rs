@@ -229,6 +229,9 @@ pub enum Cause {
     PieceTooLarge {
         printer: String,
     },
+    LettersNotPrinted {
+        letters: String,
+    },
     Failed {
         finding: String,
     },

@@ -13,6 +13,7 @@ use crate::Session;
 use crate::args::{Options, Out, Pieces};
 use crate::bed::{fitted, too_large};
 use crate::failure::Failure;
+use crate::fonts;
 use crate::input::{self, Model};
 use crate::output::{Destination, Summary, files};
 use crate::place::Standing;
@@ -187,6 +188,7 @@ impl<'a> Begun<'a> {
         let mut warnings = model.warnings.clone();
         warnings.extend(design.warnings.iter().cloned());
         warnings.extend(printing.warnings());
+        warnings.extend(fonts::warning(model, options));
         let (files, summary) = files(model, options, &design.settings, &design, &warnings, &printing);
         if session.stop.load(Ordering::Relaxed) {
             return Err(Failure::Stopped);

@@ -13,6 +13,7 @@ mod course;
 mod division;
 pub mod embed;
 mod failure;
+mod fonts;
 mod input;
 mod inspect;
 mod interrupt;

@@ -36,6 +36,21 @@ fn problem(code: &'static str, sentence: String) -> Told {
     }
 }
 
+fn letters_not_printed(letters: &str) -> String {
+    /// Letters that the sentence shows.
+    const SHOWN: usize = 20;
+    let shown: String = letters.chars().take(SHOWN).collect();
+    let more = if letters.chars().nth(SHOWN).is_some() {
+        "..."
+    } else {
+        ""
+    };
+    format!(
+        "the booklet prints boxes for \"{shown}{more}\" in the model's name: install a font that has these \
+         letters, or rename the file"
+    )
+}
+
 impl Warning {
     /// Ids of the pieces, such as "3, 5".
     fn ids(&self) -> String {
@@ -489,6 +504,9 @@ impl Warning {
                     ),
                 )
             }
+            Cause::LettersNotPrinted { letters } => {
+                warning("letters-not-printed", letters_not_printed(letters))
+            },
             Cause::Failed { finding } => problem("failed", format!("do not print this kit: {finding}")),
         }
     }
@@ -650,6 +668,9 @@ mod tests {
             },
             Cause::PieceTooLarge {
                 printer: "\"fdm\" (256 × 256 × 256 mm)".into(),
+            },
+            Cause::LettersNotPrinted {
+                letters: "兔".repeat(255),
             },
         ]
     }

@@ -173,8 +173,10 @@ fn no_text_stands_on_another_or_off_the_page_with_any_number_of_pieces_and_any_n
             before: vec![section(3), section(1)],
             after: vec![section(2)],
             paper: Paper::A4,
+            fonts: Vec::new(),
         };
-        for (k, page) in booklet.pages().iter().enumerate() {
+        let fonts = Fonts::new(&booklet.fonts);
+        for (k, page) in booklet.pages(&fonts).iter().enumerate() {
             let texts = page.texts();
             for (i, a) in texts.iter().enumerate() {
                 let is_inside = a.min[0] >= 5.0
