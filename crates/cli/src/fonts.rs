@@ -21,7 +21,9 @@ pub fn of_name(model: &Model, options: &Options) -> Vec<ExtraFont> {
 
 /// Warns of letters of the model's name that no font has.
 pub fn warning(model: &Model, options: &Options) -> Option<Warning> {
-    let letters: String = lacking(&model.name, &of_name(model, options)).into_iter().collect();
+    let letters: String = lacking(&model.name, &of_name(model, options))
+        .into_iter()
+        .collect();
     let is_printed = !options.no_booklet;
     (is_printed && !letters.is_empty()).then(|| Warning {
         cause: Cause::LettersNotPrinted { letters },
@@ -73,7 +75,11 @@ fn read(database: &Database, face: &FaceInfo) -> Option<ExtraFont> {
 
 /// Tells fonts that claim every character and draw a box or nothing for it.
 fn is_stand_in(face: &FaceInfo) -> bool {
-    let is_one = |name: &str| ["LastResort", "Last Resort", "Adobe Blank"].iter().any(|f| name.contains(f));
+    let is_one = |name: &str| {
+        ["LastResort", "Last Resort", "Adobe Blank"]
+            .iter()
+            .any(|f| name.contains(f))
+    };
     face.families.iter().any(|family| is_one(&family.0))
 }
 

@@ -13,8 +13,8 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
+use crate::fonts::{ExtraFont, Fonts, isolated};
 pub use crate::pdf::{Color, Paper};
-use crate::fonts::{ExtraFont, Fonts};
 use crate::pdf::{PAGE_MM, Page, Style, document};
 pub use bears::{Borne, WeakPlace};
 use bears::{plain, wrapped};
@@ -169,7 +169,7 @@ impl Booklet<'_> {
         pages.extend(text_pages("Afterwards", &self.after, fonts));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
-            let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
+            let foot = format!("{}  –  {} of {n_pages}", isolated(&self.title), i + 1);
             let style = small(FAINT);
             let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
             let left = PAGE_MM[0] - RIM_MM - page.width_mm(style, &foot).min(room_mm);
@@ -262,7 +262,11 @@ fn text_pages<'f>(title: &str, sections: &[Section], fonts: &'f Fonts<'f>) -> Ve
     let mut pages = Vec::new();
     let mut down = f64::INFINITY;
     for section in sections {
-        let lines: Vec<Vec<String>> = section.lines.iter().map(|l| wrapped(fonts, l, style, room_mm)).collect();
+        let lines: Vec<Vec<String>> = section
+            .lines
+            .iter()
+            .map(|l| wrapped(fonts, l, style, room_mm))
+            .collect();
         let n_lines: usize = lines.iter().map(Vec::len).sum();
         let height = LINE_MM * (n_lines as f64 + 0.4 * lines.len() as f64 + 3.0);
         if down + height > bottom_mm {
@@ -432,7 +436,10 @@ fn other_view(page: &mut Page<'_>, [x, y]: [f64; 2], sight: &Sight, picture: Ima
     page.picture([x + 2.0 + width - OTHER_MM, top], OTHER_MM, picture);
     let room_mm = width - OTHER_MM - 4.0;
     let words = format!("its place, seen from {}", view::side(-direction));
-    for (k, line) in wrapped(page.fonts(), &words, small(FAINT), room_mm).iter().enumerate() {
+    for (k, line) in wrapped(page.fonts(), &words, small(FAINT), room_mm)
+        .iter()
+        .enumerate()
+    {
         page.text_within(
             [x + 2.0, top + 14.0 + 5.0 * k as f64],
             room_mm,

@@ -134,11 +134,14 @@ impl<'a> Fonts<'a> {
             let (levels, ranges) = bidi.visual_runs(paragraph, paragraph.range.clone());
             for range in ranges {
                 let is_rtl = levels.get(range.start).is_some_and(Level::is_rtl);
-                let mut parts = self.parts(&text[range], is_bold);
+                let shown: String = text[range].chars().filter(|c| !is_direction(*c)).collect();
+                let mut parts = self.parts(&shown, is_bold);
                 if is_rtl {
                     parts.reverse();
                 }
-                let shaped = parts.into_iter().map(|(font, part)| self.shaped(font, part, is_rtl));
+                let shaped = parts
+                    .into_iter()
+                    .map(|(font, part)| self.shaped(font, part, is_rtl));
                 runs.extend(shaped);
             }
         }
@@ -183,7 +186,10 @@ impl<'a> Fonts<'a> {
                 _ => parts.push((font, at..end)),
             }
         }
-        parts.into_iter().map(|(font, range)| (font, &text[range])).collect()
+        parts
+            .into_iter()
+            .map(|(font, range)| (font, &text[range]))
+            .collect()
     }
 
     /// Font of a character, given that of the one before. Joiners and variation selectors stay with it, and so
@@ -195,7 +201,12 @@ impl<'a> Fonts<'a> {
         }
         let has = |font: &FontId| self.faces[*font].has(c);
         let others = FIRST_EXTRA..self.faces.len();
-        [own].into_iter().chain(before).chain(others).find(has).unwrap_or(own)
+        [own]
+            .into_iter()
+            .chain(before)
+            .chain(others)
+            .find(has)
+            .unwrap_or(own)
     }
 
     fn shaped(&self, font: FontId, text: &str, is_rtl: bool) -> Run {
@@ -215,7 +226,15 @@ impl<'a> Fonts<'a> {
         let glyph = |(info, at): (&rustybuzz::GlyphInfo, &rustybuzz::GlyphPosition)| {
             let start = info.cluster as usize;
             let [along, down, x, y] = [at.x_advance, at.y_advance, at.x_offset, at.y_offset].map(share);
-            KrillaGlyph::new(GlyphId::new(info.glyph_id), along, x, y, down, start..end(start), None)
+            KrillaGlyph::new(
+                GlyphId::new(info.glyph_id),
+                along,
+                x,
+                y,
+                down,
+                start..end(start),
+                None,
+            )
         };
         let glyphs = output.glyph_infos().iter().zip(output.glyph_positions());
         Run {
@@ -230,17 +249,27 @@ fn own_font(is_bold: bool) -> FontId {
     if is_bold { BOLD } else { PLAIN }
 }
 
-/// Text on one line: control characters and ends of lines become spaces, marks of direction fall away.
+/// Text on one line: control characters and ends of lines become spaces.
 pub(crate) fn printable(text: &str) -> String {
-    let is_direction = |c: &char| matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
     let is_control = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-    let kept = text.chars().filter(|c| !is_direction(c));
-    kept.map(|c| if is_control(c) { ' ' } else { c }).collect()
+    text.chars()
+        .map(|c| if is_control(c) { ' ' } else { c })
+        .collect()
+}
+
+/// Name amid other words, so that the directions of its letters do not turn the words around it.
+pub(crate) fn isolated(name: &str) -> String {
+    format!("\u{2068}{name}\u{2069}")
+}
+
+/// Tells marks of direction, which order letters and are not printed.
+fn is_direction(c: char) -> bool {
+    matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Tells joiners, variation selectors and other characters that draw nothing by themselves.
 fn is_invisible(c: char) -> bool {
-    matches!(
+    let is_ignored = matches!(
         c,
         '\u{AD}'
             | '\u{34F}'
@@ -251,7 +280,8 @@ fn is_invisible(c: char) -> bool {
             | '\u{FE00}'..='\u{FE0F}'
             | '\u{FEFF}'
             | '\u{E0000}'..='\u{E0FFF}'
-    )
+    );
+    is_ignored || is_direction(c)
 }
 
 #[cfg(test)]
@@ -282,7 +312,10 @@ mod tests {
         let fonts: Vec<(FontId, &str)> = runs.iter().map(|run| (run.font, run.text.as_str())).collect();
         assert_eq!(fonts, [(BOLD, "key "), (FIRST_EXTRA, "\u{2315}"), (BOLD, " 7")]);
         // Text that the program's fonts have is set as without the font.
-        assert_eq!(glyphs(&Fonts::new(&lent), "key 7"), glyphs(&Fonts::new(&[]), "key 7"));
+        assert_eq!(
+            glyphs(&Fonts::new(&lent), "key 7"),
+            glyphs(&Fonts::new(&[]), "key 7")
+        );
     }
 
     #[test]
@@ -303,6 +336,15 @@ mod tests {
         assert_eq!(texts, ["a ", "\u{5E2}\u{5DB}", " b"]);
         let starts: Vec<usize> = runs[1].glyphs.iter().map(|g| g.text_range.start).collect();
         assert_eq!(starts, [2, 0], "the last letter stands leftmost");
+        // What follows a name that is isolated stays behind it, even numbers.
+        for name in ["\u{5E2}\u{5DB}", "\u{202E}ab"] {
+            let runs = fonts.line(&format!("{} 2 of 9", isolated(name)), false);
+            assert_eq!(
+                runs.last().map(|run| run.text.as_str()),
+                Some(" 2 of 9"),
+                "{name:?}"
+            );
+        }
     }
 
     #[test]
@@ -311,7 +353,10 @@ mod tests {
         assert_eq!(glyphs(&fonts, "o\u{308}"), glyphs(&fonts, "ö"));
         let apart = glyphs(&fonts, "\u{628} \u{628} \u{628}");
         let joined = glyphs(&fonts, "\u{628}\u{628}\u{628}");
-        assert!(joined.len() == 3 && !joined.contains(&apart[0]) , "{joined:?} {apart:?}");
+        assert!(
+            joined.len() == 3 && !joined.contains(&apart[0]),
+            "{joined:?} {apart:?}"
+        );
     }
 
     #[test]

@@ -147,7 +147,8 @@ impl<'f> Page<'f> {
 
     /// Draws a filled polygon with an outline of width `rim_mm`.
     pub fn polygon(&mut self, corners: &[[f64; 2]], color: Color, rim_mm: f64, rim: Color) {
-        self.marks.push(Mark::Polygon(corners.to_vec(), color, rim_mm, rim));
+        self.marks
+            .push(Mark::Polygon(corners.to_vec(), color, rim_mm, rim));
     }
 
     /// Draws a filled disc as a polygon of 48 corners.
@@ -171,7 +172,9 @@ pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Krill
         enable_tagging: false,
         ..SerializeSettings::default()
     });
-    let metadata = Metadata::new().title(printable(title)).producer("shellock".to_owned());
+    let metadata = Metadata::new()
+        .title(printable(title))
+        .producer("shellock".to_owned());
     document.set_metadata(metadata.language("en".to_owned()));
     let size_mm = paper.size_mm();
     let [width, height] = size_mm.map(points);
@@ -297,7 +300,11 @@ impl CustomImage for Pixels {
 /// Picture as the file holds it, on white. It is compressed on another thread.
 fn embedded(picture: &Image) -> Result<krilla::image::Image, String> {
     let opaque = picture.clone().on([255; 3]);
-    let rgb = opaque.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let rgb = opaque
+        .rgba
+        .chunks_exact(4)
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .collect();
     let size = [opaque.width, opaque.height].map(|n| n as u32);
     krilla::image::Image::from_custom(Pixels { rgb, size }, false)
 }

@@ -506,7 +506,7 @@ impl Warning {
             }
             Cause::LettersNotPrinted { letters } => {
                 warning("letters-not-printed", letters_not_printed(letters))
-            },
+            }
             Cause::Failed { finding } => problem("failed", format!("do not print this kit: {finding}")),
         }
     }

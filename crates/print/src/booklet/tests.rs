@@ -105,6 +105,23 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
 }
 
 #[test]
+fn each_page_has_the_name_of_the_model_and_each_step_its_words_as_text() {
+    let meshes = meshes();
+    let along = [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+    let booklet = Booklet {
+        title: "Größe Ёжик".into(),
+        pieces: (0..3).map(|i| piece(&meshes[i], i, along[i])).collect(),
+        ..Booklet::default()
+    };
+    let pages = crate::pdf::tests::read(&booklet.pdf());
+    assert_eq!(pages.len(), 3);
+    assert!(pages.iter().all(|text| text.contains("Größe Ёжик")), "{pages:?}");
+    for words in ["begin with this piece", "from above", "it locks all", "3 of 3"] {
+        assert!(pages[2].contains(words), "{words}: {}", pages[2]);
+    }
+}
+
+#[test]
 fn no_pieces_make_a_booklet_without_steps() {
     assert!(Booklet::default().pdf().starts_with(b"%PDF"));
 }

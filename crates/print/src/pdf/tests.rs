@@ -75,10 +75,7 @@ fn pages_come_out_with_their_pictures_and_the_same_each_time() {
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
     assert_eq!((count(b"/Type /Page\n"), count(b"/Subtype /Image")), (2, 1));
     assert_eq!(read(&bytes)[0].trim(), "(piece) 7 \\ ☂ – ü");
-    assert!(
-        (bytes == made()) && count(b"Date") == 0,
-        "other bytes, or a date"
-    );
+    assert!((bytes == made()) && count(b"Date") == 0, "other bytes, or a date");
 }
 
 #[test]
@@ -90,14 +87,27 @@ fn a_page_has_the_size_of_its_paper() {
         let page = file.get_dictionary(file.get_pages()[&1]).unwrap();
         let size = page.get(b"MediaBox").and_then(|b| b.as_array()).unwrap();
         for (side, most) in size[2..].iter().zip(points) {
-            assert!((side.as_float().unwrap() - most).abs() < 0.01, "{paper:?}: {size:?}");
+            assert!(
+                (side.as_float().unwrap() - most).abs() < 0.01,
+                "{paper:?}: {size:?}"
+            );
         }
     }
 }
 
 #[test]
 fn names_in_many_scripts_can_be_read_from_the_file_again() {
-    for name in ["Größe", "Ёжик", "γάτα", "Łódź ő", "Կատու", "კატა", "ⴰⵎⵓⵛⵛ", "Ōtsuchi", "1 × 2 – 3"] {
+    for name in [
+        "Größe",
+        "Ёжик",
+        "γάτα",
+        "Łódź ő",
+        "Կատու",
+        "კატა",
+        "ⴰⵎⵓⵛⵛ",
+        "Ōtsuchi",
+        "1 × 2 – 3",
+    ] {
         for is_bold in [false, true] {
             assert_eq!(read(&line(name, is_bold, &[]))[0].trim(), name);
         }
@@ -118,7 +128,8 @@ fn a_picture_comes_back_pixel_for_pixel() {
     let bytes = document("", vec![page], Paper::A4).unwrap();
     let file = lopdf::Document::load_mem(&bytes).unwrap();
     let streams = file.objects.values().filter_map(|o| o.as_stream().ok());
-    let is_image = |s: &&lopdf::Stream| s.dict.get(b"Subtype").and_then(|n| n.as_name()).ok() == Some(b"Image");
+    let is_image =
+        |s: &&lopdf::Stream| s.dict.get(b"Subtype").and_then(|n| n.as_name()).ok() == Some(b"Image");
     let images: Vec<Vec<u8>> = streams
         .filter(is_image)
         .map(|s| s.decompressed_content().unwrap())
@@ -151,7 +162,11 @@ fn no_name_stops_the_program_and_what_no_font_has_becomes_a_box() {
         assert!(width_mm(&fonts, fit.0, &fit.1) <= 100.0 + 1e-9);
     }
     let runs = Fonts::new(&[]).line("兔", false);
-    assert_eq!(runs[0].glyphs[0].glyph_id.to_u32(), 0, "the glyph of no character is a box");
+    assert_eq!(
+        runs[0].glyphs[0].glyph_id.to_u32(),
+        0,
+        "the glyph of no character is a box"
+    );
     assert!(runs[0].width() > 0.3);
 }
 
