@@ -17,6 +17,21 @@ pub(crate) fn read(bytes: &[u8]) -> Vec<String> {
     pages.keys().map(text).collect()
 }
 
+/// Number of pictures that the pages of a file show. Equal pictures are stored once, so images of the file are
+/// fewer.
+pub(crate) fn n_pictures(bytes: &[u8]) -> usize {
+    let file = lopdf::Document::load_mem(bytes).expect("the file is a PDF");
+    let content = |id: lopdf::ObjectId| {
+        file.get_and_decode_page_content(id)
+            .expect("the page has content")
+    };
+    let drawn = file
+        .get_pages()
+        .into_values()
+        .flat_map(|id| content(id).operations);
+    drawn.filter(|operation| operation.operator == "Do").count()
+}
+
 /// A page of one line, as a file.
 fn line(text: &str, is_bold: bool, extra: &[ExtraFont]) -> Vec<u8> {
     let fonts = Fonts::new(extra);
