@@ -42,11 +42,11 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
     database.load_system_fonts();
     let mut faces: Vec<&FaceInfo> = database.faces().filter(|face| !is_stand_in(face)).collect();
     faces.sort_by_cached_key(|face| preference(face));
-    let has = |face: &&FaceInfo| {
-        let has = |bytes: &[u8], index| covered(bytes, index, &characters);
-        database.with_face_data(face.id, has).unwrap_or_default()
+    let read = |face: &&FaceInfo| {
+        let found = |bytes: &[u8], index| covered(bytes, index, &characters);
+        database.with_face_data(face.id, found).unwrap_or_default()
     };
-    let has: Vec<BTreeSet<char>> = faces.iter().map(has).collect();
+    let has: Vec<BTreeSet<char>> = faces.iter().map(read).collect();
     let mut sought = characters;
     let mut fonts = Vec::new();
     // Sorting is stable, so of fonts that have as many characters the first is taken. A font that cannot be
@@ -60,7 +60,7 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
             break;
         }
         let i = order.remove(0);
-        if let Some(font) = read(&database, faces[i]) {
+        if let Some(font) = loaded(&database, faces[i]) {
             fonts.push(font);
             sought = &sought - &has[i];
         }
@@ -68,19 +68,17 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
     fonts
 }
 
-fn read(database: &Database, face: &FaceInfo) -> Option<ExtraFont> {
+/// Copies a font out of its file.
+fn loaded(database: &Database, face: &FaceInfo) -> Option<ExtraFont> {
     let (bytes, index) = database.with_face_data(face.id, |bytes, index| (bytes.to_vec(), index))?;
     ExtraFont::new(bytes, index)
 }
 
 /// Tells fonts that claim every character and draw a box or nothing for it.
 fn is_stand_in(face: &FaceInfo) -> bool {
-    let is_one = |name: &str| {
-        ["LastResort", "Last Resort", "Adobe Blank"]
-            .iter()
-            .any(|f| name.contains(f))
-    };
-    face.families.iter().any(|family| is_one(&family.0))
+    const FAMILIES: [&str; 3] = ["LastResort", "Last Resort", "Adobe Blank"];
+    let mut families = face.families.iter().map(|family| &family.0);
+    families.any(|name| FAMILIES.iter().any(|stand_in| name.contains(stand_in)))
 }
 
 /// Order of preference: upright, without serifs, of usual weight; then by name, so that the order of files on

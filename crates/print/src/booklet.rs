@@ -6,6 +6,7 @@
 //! marks the steps where the viewpoint changes.
 
 mod bears;
+mod texts;
 mod view;
 
 use rayon::prelude::*;
@@ -16,8 +17,9 @@ use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 use crate::fonts::{ExtraFont, Fonts, isolated};
 pub use crate::pdf::{Color, Paper};
 use crate::pdf::{PAGE_MM, Page, Style, document};
+use bears::wrapped;
 pub use bears::{Borne, WeakPlace};
-use bears::{plain, wrapped};
+use texts::text_pages;
 use view::{Sight, side, sights};
 
 /// Margin of a page, mm.
@@ -151,11 +153,11 @@ impl Booklet<'_> {
     /// which one cannot be embedded are left out.
     pub fn pdf(&self) -> Vec<u8> {
         self.document(&self.fonts)
-            .or_else(|_| self.document(&[]))
+            .or_else(|| self.document(&[]))
             .expect("the program's own fonts can be embedded")
     }
 
-    fn document(&self, extra: &[ExtraFont]) -> krilla::error::KrillaResult<Vec<u8>> {
+    fn document(&self, extra: &[ExtraFont]) -> Option<Vec<u8>> {
         let fonts = Fonts::new(extra);
         document(&self.title, self.pages(&fonts), self.paper)
     }
@@ -248,44 +250,6 @@ impl Booklet<'_> {
         }
         page
     }
-}
-
-/// Lays out sections below one another, on as many pages as they need.
-fn text_pages<'f>(title: &str, sections: &[Section], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> {
-    const LINE_MM: f64 = 5.6;
-    const TOP_MM: f64 = 36.0;
-    let (room_mm, bottom_mm) = (PAGE_MM[0] - 2.0 * RIM_MM, PAGE_MM[1] - RIM_MM - 8.0);
-    let style = Style {
-        size_mm: 4.2,
-        ..plain(INK)
-    };
-    let mut pages = Vec::new();
-    let mut down = f64::INFINITY;
-    for section in sections {
-        let lines: Vec<Vec<String>> = section
-            .lines
-            .iter()
-            .map(|l| wrapped(fonts, l, style, room_mm))
-            .collect();
-        let n_lines: usize = lines.iter().map(Vec::len).sum();
-        let height = LINE_MM * (n_lines as f64 + 0.4 * lines.len() as f64 + 3.0);
-        if down + height > bottom_mm {
-            pages.push(headed(title, "", fonts));
-            down = TOP_MM;
-        }
-        let Some(page) = pages.last_mut() else { break };
-        page.text_within([RIM_MM, down], room_mm, bold(5.0, INK), &section.title);
-        down += 0.4 * LINE_MM;
-        for line in lines {
-            for part in line {
-                down += LINE_MM;
-                page.text_within([RIM_MM, down], room_mm, style, &part);
-            }
-            down += 0.4 * LINE_MM;
-        }
-        down += 2.0 * LINE_MM;
-    }
-    pages
 }
 
 /// Lays out all pieces by number, each seen from inside.

@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use krilla::color::rgb;
 use krilla::configure::{Configuration, PdfVersion};
-use krilla::error::KrillaResult;
 use krilla::geom::{Path, PathBuilder, Point, Size, Transform};
 use krilla::image::{BitsPerComponent, CustomImage, ImageColorspace};
 use krilla::metadata::Metadata;
@@ -163,9 +162,9 @@ impl<'f> Page<'f> {
     }
 }
 
-/// Writes the pages as a PDF file. Deterministic: equal pages give equal bytes. An error if a font that was
-/// lent cannot be embedded.
-pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> KrillaResult<Vec<u8>> {
+/// Writes the pages as a PDF file. Deterministic: equal pages give equal bytes. `None` if a font that was lent
+/// cannot be embedded.
+pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Option<Vec<u8>> {
     let mut document = Document::new_with(SerializeSettings {
         configuration: Configuration::new_with_version(PdfVersion::Pdf17),
         xmp_metadata: false,
@@ -188,7 +187,7 @@ pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Krill
         }
         surface.pop();
     }
-    document.finish()
+    document.finish().ok()
 }
 
 /// Transform that centres a page on paper of another size and scales it to fit.
