@@ -26,15 +26,83 @@ SIDES = {
 MOST_DEG = 50
 
 
+TOKEN = re.compile(rb"/(\w+) [\d.]+ Tf|(BT)\b|(ET)\b|<([0-9A-Fa-f]*)>|(\()")
+ESCAPES = {ord("n"): 10, ord("r"): 13, ord("t"): 9, ord("b"): 8, ord("f"): 12}
+
+
+def objects(pdf):
+    """Dictionary and unpacked stream of each object, by its number."""
+    found = {}
+    for number, body in re.findall(rb"^(\d+) 0 obj\n(.*?)\nendobj", pdf, re.S | re.M):
+        head, _, stream = body.partition(b"stream\n")
+        stream = stream.removesuffix(b"\nendstream")
+        found[int(number)] = head, zlib.decompress(stream) if b"/FlateDecode" in head else stream
+    return found
+
+
+def reference(head, key):
+    """Number of the object that a dictionary names."""
+    return int(re.search(rb"/" + key + rb" (\d+) 0 R", head)[1])
+
+
+def letters(table):
+    """Text of each glyph of a font, from its table (ToUnicode)."""
+    found = {}
+    for block in re.findall(rb"beginbfchar(.*?)endbfchar", table, re.S):
+        for glyph, text in re.findall(rb"<(\w+)>\s*<(\w+)>", block):
+            found[int(glyph, 16)] = bytes.fromhex(text.decode()).decode("utf-16-be")
+    for block in re.findall(rb"beginbfrange(.*?)endbfrange", table, re.S):
+        for first, last, text in re.findall(rb"<(\w+)>\s*<(\w+)>\s*<(\w+)>", block):
+            for i in range(int(first, 16), int(last, 16) + 1):
+                found[i] = chr(int(text, 16) + i - int(first, 16))
+    return found
+
+
+def literal(content, at):
+    """Bytes of a string in parentheses that begins before `at`, and where it ends."""
+    made, depth = bytearray(), 1
+    while True:
+        byte = content[at]
+        at += 1
+        if byte == ord("\\"):
+            digits = re.compile(rb"[0-7]{1,3}").match(content, at)
+            made.append(int(digits[0], 8) if digits else ESCAPES.get(content[at], content[at]))
+            at = digits.end() if digits else at + 1
+            continue
+        depth += (byte == ord("(")) - (byte == ord(")"))
+        if depth == 0:
+            return bytes(made), at
+        made.append(byte)
+
+
+def lines_of(content, fonts):
+    """Lines of text that a page's drawing has, in order."""
+    at, line, font = 0, "", {}
+    while token := TOKEN.search(content, at):
+        at = token.end()
+        name, begins, ends, digits, _ = token.groups()
+        if name:
+            font = fonts[name]
+        elif begins:
+            line = ""
+        elif ends:
+            yield line
+        else:
+            shown, at = (bytes.fromhex(digits.decode()), at) if digits is not None else literal(content, at)
+            glyphs = (shown[i] << 8 | shown[i + 1] for i in range(0, len(shown), 2))
+            line += "".join(font.get(glyph, "?") for glyph in glyphs)
+
+
 def texts(pdf):
     """All lines of text, in order."""
-    for stream in re.finditer(rb"stream\r?\n(.*?)endstream", pdf, re.S):
-        try:
-            content = zlib.decompress(stream[1])
-        except zlib.error:
+    found = objects(pdf)
+    for head, _ in list(found.values()):
+        if not re.search(rb"/Type /Page\b", head):
             continue
-        for line in re.findall(rb"\(((?:\\.|[^\\)])*)\) Tj", content):
-            yield line.decode("cp1252")
+        fonts = re.search(rb"/Font\s*<<(.*?)>>", head, re.S)
+        named = re.findall(rb"/(\w+) (\d+) 0 R", fonts[1] if fonts else b"")
+        tables = {name: letters(found[reference(found[int(n)][0], b"ToUnicode")][1]) for name, n in named}
+        yield from lines_of(found[reference(head, b"Contents")][1], tables)
 
 
 def steps(lines):

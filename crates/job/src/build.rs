@@ -9,6 +9,7 @@ use crate::Session;
 use crate::bed::{fitted, too_large};
 use crate::clock::{Deadline, PlanClock};
 use crate::failure::Failure;
+use crate::fonts;
 use crate::input::{self, Model};
 use crate::options::Options;
 use crate::output::{Summary, files};
@@ -150,6 +151,7 @@ impl<'a> Begun<'a> {
         let mut warnings = model.warnings.clone();
         warnings.extend(design.warnings.iter().cloned());
         warnings.extend(printing.warnings());
+        warnings.extend(fonts::warning(model, options));
         let (files, summary) = files(model, options, &design.settings, &design, &warnings, &printing);
         if session.is_stopped() {
             return Err(Failure::Stopped);

@@ -18,6 +18,11 @@ pub enum Cause {
         /// Name and size of the printer.
         printer: String,
     },
+    /// No font has some letters of the model's name.
+    LettersNotPrinted {
+        /// The letters that are missing.
+        letters: String,
+    },
     /// A check of the kit failed.
     Failed {
         /// Finding of the check, in words.
@@ -40,9 +45,27 @@ impl Diagnostic for Cause {
                 ),
             )
             .by(&["pieces", "printer"]),
+            Self::LettersNotPrinted { letters } => {
+                Told::warning("letters-not-printed", letters_not_printed(letters))
+            }
             Self::Failed { finding } => Told::problem("failed", format!("do not print this kit: {finding}")),
         }
     }
+}
+
+fn letters_not_printed(letters: &str) -> String {
+    /// Number of letters that the sentence shows.
+    const SHOWN: usize = 20;
+    let shown: String = letters.chars().take(SHOWN).collect();
+    let more = if letters.chars().nth(SHOWN).is_some() {
+        "..."
+    } else {
+        ""
+    };
+    format!(
+        "the booklet prints boxes for \"{shown}{more}\" in the model's name: install a font that has these \
+         letters, or rename the file"
+    )
 }
 
 #[cfg(test)]
@@ -57,6 +80,9 @@ mod tests {
         for cause in [
             Cause::PieceTooLarge {
                 printer: "\"fdm\" (256 × 256 × 256 mm)".into(),
+            },
+            Cause::LettersNotPrinted {
+                letters: "兔".repeat(255),
             },
             Cause::Failed {
                 finding: "piece 3 is not closed".into(),

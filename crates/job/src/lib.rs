@@ -23,6 +23,7 @@ pub mod division;
 pub mod embed;
 pub mod failure;
 pub mod files;
+mod fonts;
 pub mod input;
 pub mod kits;
 mod loads;

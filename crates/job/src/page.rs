@@ -16,6 +16,7 @@ use shellock_render::{
 
 use crate::bears;
 use crate::causes::Cause;
+use crate::fonts;
 use crate::input::Model;
 use crate::loads;
 use crate::options::Options;
@@ -87,6 +88,7 @@ pub fn report(
         },
         after: tabs::after(has_passed),
         paper: options.paper.into(),
+        fonts: fonts::of_name(model, options),
     };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),

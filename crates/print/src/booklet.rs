@@ -6,6 +6,7 @@
 //! marks the steps where the viewpoint changes.
 
 mod bears;
+mod texts;
 mod view;
 
 use rayon::prelude::*;
@@ -13,10 +14,12 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
+use crate::fonts::{ExtraFont, Fonts, isolated};
 pub use crate::pdf::{Color, Paper};
-use crate::pdf::{PAGE_MM, Page, Style, document, width_mm};
+use crate::pdf::{PAGE_MM, Page, Style, document};
+use bears::wrapped;
 pub use bears::{Borne, WeakPlace};
-use bears::{plain, wrapped};
+use texts::text_pages;
 use view::{Sight, side, sights};
 
 /// Margin of a page, mm.
@@ -53,6 +56,9 @@ pub struct Booklet<'a> {
     pub after: Vec<Section>,
     /// Paper that the booklet is printed on.
     pub paper: Paper,
+    /// Fonts for characters that the program's fonts lack ([`lacking`](crate::fonts::lacking)), the preferred
+    /// first.
+    pub fonts: Vec<ExtraFont>,
 }
 
 /// A heading with paragraphs of text.
@@ -143,24 +149,32 @@ fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2])
 }
 
 impl Booklet<'_> {
-    /// Writes the booklet as a PDF file. Deterministic: equal pieces give equal bytes.
+    /// Writes the booklet as a PDF file. Deterministic: equal pieces and fonts give equal bytes. Fonts of
+    /// which one cannot be embedded are left out.
     pub fn pdf(&self) -> Vec<u8> {
-        document(&self.title, self.pages(), self.paper)
+        self.document(&self.fonts)
+            .or_else(|| self.document(&[]))
+            .expect("the program's own fonts can be embedded")
     }
 
-    fn pages(&self) -> Vec<Page> {
+    fn document(&self, extra: &[ExtraFont]) -> Option<Vec<u8>> {
+        let fonts = Fonts::new(extra);
+        document(&self.title, self.pages(&fonts), self.paper)
+    }
+
+    fn pages<'f>(&self, fonts: &'f Fonts<'f>) -> Vec<Page<'f>> {
         let drawn = self.drawn();
-        let mut pages = vec![self.cover(&drawn)];
-        pages.extend(text_pages("Before you begin", &self.before));
-        pages.extend(pieces_pages(&drawn));
-        pages.extend(steps_pages(&drawn, self.bears.as_ref()));
-        pages.extend(text_pages("Afterwards", &self.after));
+        let mut pages = vec![self.cover(&drawn, fonts)];
+        pages.extend(text_pages("Before you begin", &self.before, fonts));
+        pages.extend(pieces_pages(&drawn, fonts));
+        pages.extend(steps_pages(&drawn, self.bears.as_ref(), fonts));
+        pages.extend(text_pages("Afterwards", &self.after, fonts));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
-            let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
+            let foot = format!("{}  –  {} of {n_pages}", isolated(&self.title), i + 1);
             let style = small(FAINT);
             let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
-            let left = PAGE_MM[0] - RIM_MM - width_mm(style, &foot).min(room_mm);
+            let left = PAGE_MM[0] - RIM_MM - page.width_mm(style, &foot).min(room_mm);
             page.text_within([left, PAGE_MM[1] - 8.0], room_mm, style, &foot);
         }
         pages
@@ -200,8 +214,8 @@ impl Booklet<'_> {
         drawn
     }
 
-    fn cover(&self, drawn: &[Drawn<'_>]) -> Page {
-        let mut page = Page::new();
+    fn cover<'f>(&self, drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Page<'f> {
+        let mut page = Page::new(fonts);
         let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
         page.text_within([RIM_MM, 30.0], room_mm, bold(11.0, INK), &self.title);
         let seen = format!(
@@ -238,42 +252,8 @@ impl Booklet<'_> {
     }
 }
 
-/// Lays out sections below one another, on as many pages as they need.
-fn text_pages(title: &str, sections: &[Section]) -> Vec<Page> {
-    const LINE_MM: f64 = 5.6;
-    const TOP_MM: f64 = 36.0;
-    let (room_mm, bottom_mm) = (PAGE_MM[0] - 2.0 * RIM_MM, PAGE_MM[1] - RIM_MM - 8.0);
-    let style = Style {
-        size_mm: 4.2,
-        ..plain(INK)
-    };
-    let mut pages = Vec::new();
-    let mut down = f64::INFINITY;
-    for section in sections {
-        let lines: Vec<Vec<String>> = section.lines.iter().map(|l| wrapped(l, style, room_mm)).collect();
-        let n_lines: usize = lines.iter().map(Vec::len).sum();
-        let height = LINE_MM * (n_lines as f64 + 0.4 * lines.len() as f64 + 3.0);
-        if down + height > bottom_mm {
-            pages.push(headed(title, ""));
-            down = TOP_MM;
-        }
-        let Some(page) = pages.last_mut() else { break };
-        page.text_within([RIM_MM, down], room_mm, bold(5.0, INK), &section.title);
-        down += 0.4 * LINE_MM;
-        for line in lines {
-            for part in line {
-                down += LINE_MM;
-                page.text_within([RIM_MM, down], room_mm, style, &part);
-            }
-            down += 0.4 * LINE_MM;
-        }
-        down += 2.0 * LINE_MM;
-    }
-    pages
-}
-
 /// Lays out all pieces by number, each seen from inside.
-fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
+fn pieces_pages<'f>(drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> {
     let middle = drawn
         .iter()
         .fold(Aabb::EMPTY, |b, d| b.union(d.piece.mesh.bounds()))
@@ -298,6 +278,7 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
         let mut page = headed(
             "Pieces",
             "each carries its number on its inner side; they go in by number",
+            fonts,
         );
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
@@ -338,7 +319,7 @@ fn step_pixels() -> [usize; 2] {
 }
 
 /// Lays out one picture per step, then the finished kit and the loads that it withstands.
-fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
+fn steps_pages<'f>(drawn: &[Drawn<'_>], bears: Option<&Borne>, fonts: &'f Fonts<'f>) -> Vec<Page<'f>> {
     let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
     let sights = sights(&pieces);
     let cell = cell_mm(STEPS, 0.0);
@@ -359,9 +340,9 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     let together = vec![Vec3::ZERO; drawn.len()];
     let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
     let mut pages = Vec::new();
-    let page_of = |i: usize, pages: &mut Vec<Page>| {
+    let page_of = |i: usize, pages: &mut Vec<Page<'f>>| {
         if i.is_multiple_of(STEPS[0] * STEPS[1]) {
-            pages.push(Page::new());
+            pages.push(Page::new(fonts));
         }
         pages.len() - 1
     };
@@ -412,14 +393,17 @@ fn in_place(drawn: &[Drawn<'_>], i: usize, direction: Vec3, size: [usize; 2]) ->
 }
 
 /// Draws the second view below a step's picture, with its caption.
-fn other_view(page: &mut Page, [x, y]: [f64; 2], sight: &Sight, picture: Image) {
+fn other_view(page: &mut Page<'_>, [x, y]: [f64; 2], sight: &Sight, picture: Image) {
     let Some(direction) = sight.other else { return };
     let [width, height] = step_mm();
     let top = y + 20.0 + height - OTHER_MM;
     page.picture([x + 2.0 + width - OTHER_MM, top], OTHER_MM, picture);
     let room_mm = width - OTHER_MM - 4.0;
     let words = format!("its place, seen from {}", view::side(-direction));
-    for (k, line) in wrapped(&words, small(FAINT), room_mm).iter().enumerate() {
+    for (k, line) in wrapped(page.fonts(), &words, small(FAINT), room_mm)
+        .iter()
+        .enumerate()
+    {
         page.text_within(
             [x + 2.0, top + 14.0 + 5.0 * k as f64],
             room_mm,
@@ -429,7 +413,7 @@ fn other_view(page: &mut Page, [x, y]: [f64; 2], sight: &Sight, picture: Image) 
     }
 }
 
-fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {
+fn step_heading(page: &mut Page<'_>, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {
     let left = x + 1.0;
     numbered(
         page,
@@ -470,7 +454,7 @@ fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     (if is_new { format!("turn it: {seen}") } else { seen }, is_new)
 }
 
-fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
+fn finish_heading(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
     page.text([x + 1.0, y + 6.6], bold(5.0, INK), "done");
     if let Some(key) = drawn.last() {
@@ -536,7 +520,7 @@ fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
 }
 
 /// Draws a number on a disc in the colour of a piece.
-fn numbered(page: &mut Page, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
+fn numbered(page: &mut Page<'_>, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
     page.disc(middle, radius_mm, color);
     let is_dark = color.iter().map(|&c| u32::from(c)).sum::<u32>() < 400;
     page.text_amid(
@@ -546,11 +530,11 @@ fn numbered(page: &mut Page, middle: [f64; 2], radius_mm: f64, color: Color, num
     );
 }
 
-fn headed(title: &str, note: &str) -> Page {
-    let mut page = Page::new();
+fn headed<'f>(title: &str, note: &str, fonts: &'f Fonts<'f>) -> Page<'f> {
+    let mut page = Page::new(fonts);
     page.text([RIM_MM, RIM_MM + 6.0], bold(7.0, INK), title);
     if !note.is_empty() {
-        let left = RIM_MM + 6.0 + width_mm(bold(7.0, INK), title);
+        let left = RIM_MM + 6.0 + page.width_mm(bold(7.0, INK), title);
         page.text([left, RIM_MM + 6.0], small(FAINT), note);
     }
     page

@@ -6,6 +6,7 @@
 
 pub mod booklet;
 pub mod columns;
+pub mod fonts;
 pub mod load;
 mod pdf;
 pub mod plates;

@@ -8,6 +8,7 @@ use super::{
     ARROW, Color, Drawn, FAINT, Facing, GREY, INK, OTHER_DENSITY, STEPS, WHITE, bold, cell_mm, numbered,
     small,
 };
+use crate::fonts::Fonts;
 use crate::pdf::{Page, Style, width_mm};
 
 /// Distance between lines of text, mm.
@@ -41,7 +42,7 @@ pub struct WeakPlace {
 }
 
 /// Fills the cell whose upper left corner is at `[x, y]`, mm.
-pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne: &Borne) {
+pub(super) fn fill(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne: &Borne) {
     let cell = cell_mm(STEPS, 0.0);
     let (left, room_mm) = (x + 1.0, cell[0] - 4.0);
     page.text([left, y + 6.6], bold(5.0, INK), "what it bears");
@@ -61,7 +62,7 @@ pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne
     let Some(weakest) = &borne.weakest else { return };
     down += 1.6 * LINE_MM;
     page.text([left, down], bold(3.8, ARROW), "gives way first");
-    for line in wrapped(&weakest.words, plain(INK), room_mm) {
+    for line in wrapped(page.fonts(), &weakest.words, plain(INK), room_mm) {
         down += LINE_MM;
         page.text_within([left, down], room_mm, plain(INK), &line);
     }
@@ -78,7 +79,7 @@ pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne
 /// Draws the two separating pieces in their colours among the others in grey, with the seam and the weakest
 /// place.
 fn place(
-    page: &mut Page,
+    page: &mut Page<'_>,
     [left, top]: [f64; 2],
     [width_mm, height_mm]: [f64; 2],
     drawn: &[Drawn<'_>],
@@ -121,7 +122,7 @@ fn place(
 }
 
 /// Draws a straight line of fixed width; nothing for coinciding ends.
-fn stroke(page: &mut Page, [from, to]: [[f64; 2]; 2]) {
+fn stroke(page: &mut Page<'_>, [from, to]: [[f64; 2]; 2]) {
     let way = [to[0] - from[0], to[1] - from[1]];
     let far = way[0].hypot(way[1]);
     if far < 1e-6 {
@@ -147,11 +148,11 @@ pub(super) fn plain(color: Color) -> Style {
 }
 
 /// Breaks a text into lines of whole words no wider than `room_mm`. A single longer word keeps its width.
-pub(super) fn wrapped(text: &str, style: Style, room_mm: f64) -> Vec<String> {
+pub(super) fn wrapped(fonts: &Fonts<'_>, text: &str, style: Style, room_mm: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if width_mm(style, &format!("{line} {word}")) <= room_mm => {
+            Some(line) if width_mm(fonts, style, &format!("{line} {word}")) <= room_mm => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -169,9 +170,11 @@ mod tests {
     fn lines_have_room_and_all_words() {
         let text =
             "where it is pressed as it lies: pins between pieces 7 and 10 bend (in the middle, 37 mm up)";
-        let lines = wrapped(text, plain(INK), 50.0);
-        assert!(lines.len() > 1 && lines.iter().all(|l| width_mm(plain(INK), l) <= 50.0));
+        let fonts = Fonts::new(&[]);
+        let lines = wrapped(&fonts, text, plain(INK), 50.0);
+        let fits = |line: &String| width_mm(&fonts, plain(INK), line) <= 50.0;
+        assert!(lines.len() > 1 && lines.iter().all(fits));
         assert_eq!(lines.join(" "), text);
-        assert!(wrapped("", plain(INK), 50.0).is_empty());
+        assert!(wrapped(&fonts, "", plain(INK), 50.0).is_empty());
     }
 }

@@ -3,6 +3,7 @@ use shellock_testkit::shapes::cuboid;
 
 use super::view::Lookout;
 use super::*;
+use crate::pdf::tests::{n_pictures, read};
 
 fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
     ReportPiece {
@@ -79,10 +80,7 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
     // Cover, pieces, one page of three steps and the end; two pictures on the cover, one per piece, one per
     // step, one at the end.
-    assert_eq!(
-        (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
-        (3, 2 + 3 + 3 + 1)
-    );
+    assert_eq!((count(b"/Type /Page\n"), n_pictures(&bytes)), (3, 2 + 3 + 3 + 1));
     assert!(bytes == made(None));
     // The loads take the cell after the end: on a second page after three steps and the end.
     let bears = Borne {
@@ -98,10 +96,27 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     let bytes = made(Some(bears.clone()));
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
     assert_eq!(
-        (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
+        (count(b"/Type /Page\n"), n_pictures(&bytes)),
         (4, 2 + 3 + 3 + 1 + 1)
     );
     assert!(bytes == made(Some(bears)));
+}
+
+#[test]
+fn each_page_has_the_name_of_the_model_and_each_step_its_words_as_text() {
+    let meshes = meshes();
+    let along = [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+    let booklet = Booklet {
+        title: "Größe Ёжик".into(),
+        pieces: (0..3).map(|i| piece(&meshes[i], i, along[i])).collect(),
+        ..Booklet::default()
+    };
+    let pages = read(&booklet.pdf());
+    assert_eq!(pages.len(), 3);
+    assert!(pages.iter().all(|text| text.contains("Größe Ёжик")), "{pages:?}");
+    for words in ["begin with this piece", "from above", "it locks all", "3 of 3"] {
+        assert!(pages[2].contains(words), "{words}: {}", pages[2]);
+    }
 }
 
 #[test]
@@ -173,8 +188,10 @@ fn no_text_stands_on_another_or_off_the_page_with_any_number_of_pieces_and_any_n
             before: vec![section(3), section(1)],
             after: vec![section(2)],
             paper: Paper::A4,
+            fonts: Vec::new(),
         };
-        for (k, page) in booklet.pages().iter().enumerate() {
+        let fonts = Fonts::new(&booklet.fonts);
+        for (k, page) in booklet.pages(&fonts).iter().enumerate() {
             let texts = page.texts();
             for (i, a) in texts.iter().enumerate() {
                 let is_inside = a.min[0] >= 5.0
@@ -211,6 +228,5 @@ fn a_place_that_is_hidden_is_shown_from_elsewhere_too() {
     };
     let n_other = sights.iter().filter(|s| s.other.is_some()).count();
     let pdf = bytes(pieces.clone());
-    let n_pictures = pdf.windows(15).filter(|w| *w == b"/Subtype /Image").count();
-    assert_eq!(n_pictures, 2 + 3 + 3 + 1 + n_other);
+    assert_eq!(n_pictures(&pdf), 2 + 3 + 3 + 1 + n_other);
 }
