@@ -398,8 +398,8 @@ fn work_that_leads_to_no_plan_or_to_an_error_counts() {
 
 #[test]
 fn pieces_that_are_not_divided_again_for_want_of_time_are_reported() {
-    let none = || 0.0;
-    let late = Ctx::quiet().with_deadline(&none);
+    let little = || 0.1;
+    let late = Ctx::quiet().with_deadline(&little);
     let is_cut_short = |ctx: &Ctx, refinements| {
         let mut params = at_once();
         params.rounds.refinements = refinements;
