@@ -27,6 +27,9 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
                 .map(|e| e.to_string()),
         );
     }
+    if options.effort.is_some_and(|s| s.is_nan() || s <= 0.0) {
+        problems.push("effort must be above 0 s".to_owned());
+    }
     // An infinite time is allowed: the search then runs until the proof is closed.
     if options.time.is_nan() || options.time < 0.0 {
         problems.push(format!("time is {} s; it must be 0 or more", options.time));
@@ -123,7 +126,7 @@ impl<'a> Begun<'a> {
                 is_cut_short,
                 ..
             } => {
-                let told = no_plan(&reason, &blockers);
+                let told = no_plan(&reason, &blockers, is_cut_short);
                 return Err(Failure::NoPlan { told, is_cut_short });
             }
         };
@@ -179,18 +182,21 @@ pub fn planned(
         design::plan(ctx, params, &model.solid, model.labels.as_deref())
     });
     planned?.map_err(|none| Failure::NoPlan {
-        told: format!("no plan was found: {}", none.reason),
+        told: no_plan(&none.reason, &[], none.is_cut_short),
         is_cut_short: none.is_cut_short,
     })
 }
 
-/// Runs `work` with the time limits that the options set.
+/// Runs `work` with the limits that the options set: of work, which needs no clock, or of time.
 fn timed<T>(
     session: &Session,
     options: &Options,
     show: &(dyn Fn(Progress<'_>) + Sync),
     work: impl FnOnce(&Ctx<'_>) -> T,
 ) -> T {
+    if options.effort.is_some() {
+        return work(&Ctx::new(show, &session.stop));
+    }
     let clock = PlanClock::new(options.plan_time);
     let report = |p: Progress<'_>| {
         clock.see(&p);
@@ -205,8 +211,12 @@ fn timed<T>(
     work(&ctx)
 }
 
-fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> String {
-    let mut text = format!("no plan was found: {reason}");
+/// Reason why there is no kit, in words.
+fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker], is_cut_short: bool) -> String {
+    let mut text = match is_cut_short {
+        true => format!("{reason}; give it more time (--time)"),
+        false => format!("no plan was found: {reason}"),
+    };
     for b in blockers {
         let [x, y, z] = b.at;
         let share = 100.0 * b.occluded;

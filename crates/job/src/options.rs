@@ -78,6 +78,8 @@ pub struct Options {
     pub key: Key,
     /// Time for the whole job, s; 0 takes the time it takes.
     pub time: f64,
+    /// Work for the whole job, processor seconds of an ordinary computer; > 0. It takes the place of `time`.
+    pub effort: Option<f64>,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer.
     pub plan_time: f64,
     /// Wall thickness.
@@ -145,6 +147,7 @@ impl Default for Options {
             keep_whole: Vec::new(),
             key: Key::Auto,
             time: 60.0,
+            effort: None,
             plan_time: 10.0,
             thickness: Thickness::Auto,
             material: None,
@@ -213,6 +216,7 @@ impl Options {
         };
         p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
         p.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
+        p.effort_s = self.effort;
         p.is_play_together = self.play_together;
         p.allows_thin = self.allow_thin;
         p

@@ -113,6 +113,11 @@ impl<'a> Ctx<'a> {
         (self.report)(Progress::Note(text));
     }
 
+    /// Returns true if the end of the time stops the work, and not the user.
+    pub fn is_time_over(&self) -> bool {
+        self.ends_in_time && self.seconds_left() <= 0.0 && !self.stop.load(Ordering::Relaxed)
+    }
+
     /// Fails if the user requested a stop, or at the end of the time where that is a stop. Long loops call it
     /// regularly.
     pub fn check(&self) -> Result<(), Cancelled> {

@@ -381,11 +381,21 @@ pub const DECLARED: &[Declared] = &[
     text(PIECES, "time", "SECONDS", |o, t| seconds(t).map(|v| o.time = v))
         .help(
             "For the whole job; 0: as long as it takes",
-            "Seconds for the whole job: no further kit is begun that would end later, and the best \
-             so far is finished; 0 takes the time it takes",
+            "Seconds for the whole job: when they are over, the best kit so far is finished; 0 takes \
+             the time it takes",
         )
         .default("60")
         .with_hyphens(),
+    text(PIECES, "effort", "SECONDS", |o, t| {
+        seconds(t).map(|v| o.effort = Some(v))
+    })
+    .help(
+        "Work instead of time: the same kit on any machine",
+        "Work for the whole job instead of time, in processor seconds of an ordinary computer as the \
+             size of the pieces lets expect them: the kit is the same on any machine",
+    )
+    .not_with(&["time"])
+    .with_hyphens(),
     text(PIECES, "plan-time", "SECONDS", |o, t| {
         seconds(t).map(|v| o.plan_time = v)
     })

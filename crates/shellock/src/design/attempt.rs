@@ -147,6 +147,7 @@ pub(super) fn make_kit(
         Err(lesson) => give_up(ctx, division, learned, &lesson, allowance)?,
     };
     let late = late.or(found.late);
+    let is_hurried = is_hurried || found.end.as_ref().is_some_and(Kit::is_hurried);
     Ok(Found {
         late,
         is_hurried,

@@ -51,6 +51,7 @@ pub enum Cause {
     TimeUp {
         kits: usize,
     },
+    WaysOutNotSought,
 }
 
 impl Diagnostic for Cause {
@@ -152,6 +153,15 @@ impl Diagnostic for Cause {
                     if *is_slot { "wide" } else { "thick" },
                 ),
             ),
+            Self::WaysOutNotSought => Told::warning(
+                "ways-out-not-sought",
+                format!(
+                    "the time was over before a way out was sought for {}, whose play is not proven; with \
+                     more time it is",
+                    named(pieces)
+                ),
+            )
+            .by(&["time"]),
             Self::TimeUp { kits: 0 } => Told::warning(
                 "time-up",
                 "the time was over; with more time the plan may be better".into(),
@@ -236,6 +246,7 @@ mod tests {
                 is_slot: true,
             },
             Cause::TimeUp { kits: 3 },
+            Cause::WaysOutNotSought,
         ] {
             let sentence = cause.tell(&pieces).sentence;
             let n = sentence.chars().count();

@@ -86,6 +86,11 @@ impl Kit {
         self.verification.passed() && self.rattles.is_empty()
     }
 
+    /// Returns true if the time was over before ways out were sought that a proof does not rule out.
+    pub(super) fn is_hurried(&self) -> bool {
+        self.verification.passed() && self.play.ways_out.is_none()
+    }
+
     /// Returns true if rattling is the only fault: a piece rattles, and either no check fails, or one fails
     /// and all findings are of play that is too wide.
     pub fn only_rattles(&self) -> bool {
@@ -259,7 +264,12 @@ fn judged(
     verification.add(play::check(&measured, &rattles));
     if verification.passed() {
         // The search for ways out is slow, so kits that already fail are not searched.
-        play::look_for_ways_out(ctx, settings.verify.clearance_mm, &finished.meshes, &mut measured)?;
+        let clearance_mm = settings.verify.clearance_mm;
+        match play::look_for_ways_out(ctx, clearance_mm, &finished.meshes, &mut measured) {
+            // A kit outlives the end of the time in it, since it only confirms what holds.
+            Err(_) if ctx.is_time_over() => ctx.warn(not_searched(&measured)),
+            searched => searched?,
+        }
         play::check_ways_out(&measured, &finished.meshes)
             .into_iter()
             .for_each(|check| verification.add(check));
@@ -270,6 +280,13 @@ fn judged(
         play: measured,
         rattles,
     })
+}
+
+/// Warning of pieces for which no way out was sought.
+fn not_searched(play: &KitPlay) -> Warning {
+    let key = play.slide.key;
+    let pieces = play.unproven().filter(|piece| *piece != key).collect();
+    Warning::new(Cause::WaysOutNotSought, pieces, None)
 }
 
 /// Warns of detents that the key must be pressed past, and of ribs that hold a key without rails.

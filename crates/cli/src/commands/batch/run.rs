@@ -20,6 +20,8 @@ use crate::config;
 /// Memory that a kit takes at least, and per MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
 const LEAST_MB: f64 = 600.0;
 const MB_PER_MB: f64 = 12.0;
+/// Work on a kit if neither time nor work is limited, s: so that kits do not depend on what runs beside them.
+const USUAL_EFFORT_S: f64 = 60.0;
 /// Message for a model that was made twice.
 const AGAIN: &str = "made twice: beside others the time (--time) was over before a kit passed";
 /// Message for a model without a kit whose folder holds an earlier one.
@@ -41,18 +43,34 @@ pub struct Run {
     cores: usize,
 }
 
+/// Returns true if the arguments or the configuration file limit the time or the work of a kit.
+fn has_limit(arguments: &[String], config: &[u8]) -> bool {
+    let is_limit = |name: &str| ["time", "effort"].contains(&name);
+    let of_argument = |word: &String| {
+        let name = word
+            .strip_prefix("--")
+            .map(|word| word.split('=').next().unwrap_or(word));
+        name.is_some_and(is_limit)
+    };
+    let file: toml::Table = toml::from_slice(config).unwrap_or_default();
+    arguments.iter().any(of_argument) || file.keys().any(|key| is_limit(key))
+}
+
 impl Run {
     pub fn new(options: &BatchOptions, n_models: usize) -> Result<Self, Failure> {
         // All cores, or --threads.
         let cores = rayon::current_num_threads();
         let n_workers = options.jobs.unwrap_or(cores).min(n_models).clamp(1, 256);
-        let arguments = config::build_arguments(std::env::args_os().collect());
+        let mut arguments = config::build_arguments(std::env::args_os().collect());
         let file = options
             .options
             .config
             .clone()
             .unwrap_or_else(|| PathBuf::from(USUAL));
         let config = fs::read(file).unwrap_or_default();
+        if !has_limit(&arguments, &config) {
+            arguments.push(format!("--effort={USUAL_EFFORT_S}"));
+        }
         let made_with = [
             super::program().as_bytes(),
             arguments.join("\n").as_bytes(),
