@@ -58,6 +58,12 @@ def letters(table):
     return found
 
 
+def font_of(found, number):
+    """Text of each glyph of a font, and how many bytes name a glyph."""
+    head = found[number][0]
+    return letters(found[reference(head, b"ToUnicode")][1]), 2 if b"/Type0" in head else 1
+
+
 def literal(content, at):
     """Bytes of a string in parentheses that begins before `at`, and where it ends."""
     made, depth = bytearray(), 1
@@ -77,19 +83,19 @@ def literal(content, at):
 
 def lines_of(content, fonts):
     """Lines of text that a page's drawing has, in order."""
-    at, line, font = 0, "", {}
+    at, line, (font, width) = 0, "", ({}, 1)
     while token := TOKEN.search(content, at):
         at = token.end()
         name, begins, ends, digits, _ = token.groups()
         if name:
-            font = fonts[name]
+            font, width = fonts[name]
         elif begins:
             line = ""
         elif ends:
             yield line
         else:
             shown, at = (bytes.fromhex(digits.decode()), at) if digits is not None else literal(content, at)
-            glyphs = (shown[i] << 8 | shown[i + 1] for i in range(0, len(shown), 2))
+            glyphs = (int.from_bytes(shown[i : i + width], "big") for i in range(0, len(shown), width))
             line += "".join(font.get(glyph, "?") for glyph in glyphs)
 
 
@@ -101,7 +107,7 @@ def texts(pdf):
             continue
         fonts = re.search(rb"/Font\s*<<(.*?)>>", head, re.S)
         named = re.findall(rb"/(\w+) (\d+) 0 R", fonts[1] if fonts else b"")
-        tables = {name: letters(found[reference(found[int(n)][0], b"ToUnicode")][1]) for name, n in named}
+        tables = {name: font_of(found, int(n)) for name, n in named}
         yield from lines_of(found[reference(head, b"Contents")][1], tables)
 
 
