@@ -57,20 +57,45 @@ const MOST_THREADS: usize = 256;
 
 /// Runs the program with its arguments and returns its exit code.
 pub fn command_line() -> ExitCode {
-    let wants_json = std::env::args_os().any(|word| word == "--json");
     let cli = match config::command_line(std::env::args_os().collect()) {
         Ok(cli) => cli,
-        Err(config::Refusal::Arguments(e)) => {
+        Err(refusal) => return refuse_arguments(refusal),
+    };
+    report_panics();
+    let session = Session::new(&cli);
+    watch_stops(&session, &cli);
+    if let Some(n) = cli.threads
+        && let Err(e) = rayon::ThreadPoolBuilder::new()
+            .num_threads(n.clamp(1, MOST_THREADS))
+            .build_global()
+    {
+        eprintln!("warning: --threads {n} was not taken: {e}");
+    }
+    match run(&session, cli.command) {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => report_failure(&session, &failure),
+    }
+}
+
+/// Reports arguments or a file of them that cannot be used, or prints the help that they ask for.
+fn refuse_arguments(refusal: config::Refusal) -> ExitCode {
+    let wants_json = std::env::args_os().any(|word| word == "--json");
+    match refusal {
+        config::Refusal::Arguments(e) => {
             let is_help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
             if !is_help && wants_json {
                 let text = e.render().to_string();
                 return refuse(true, text.trim().trim_start_matches("error: "), 2);
             }
             let _ = e.print();
-            return ExitCode::from(if is_help { 0 } else { 2 });
+            ExitCode::from(if is_help { 0 } else { 2 })
         }
-        Err(config::Refusal::File(problem)) => return refuse(wants_json, &problem.to_string(), 2),
-    };
+        config::Refusal::File(problem) => refuse(wants_json, &problem.to_string(), 2),
+    }
+}
+
+/// Reports panics as the system does, but for those that become errors and for failures of standard output.
+fn report_panics() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         // A guarded panic becomes an error, which is reported as such.
@@ -86,7 +111,10 @@ pub fn command_line() -> ExitCode {
             None => tell(panic),
         }
     }));
-    let session = Session::new(&cli);
+}
+
+/// Watches for Ctrl-C, and for the end of standard input if that is asked for.
+fn watch_stops(session: &Session, cli: &args::Cli) {
     let is_json = session.is_json;
     let is_batch = matches!(cli.command, Command::Batch(_));
     let told = move || {
@@ -101,30 +129,19 @@ pub fn command_line() -> ExitCode {
     if cli.stop_with_stdin {
         interrupt::watch_stdin(&session.job.stop, told);
     }
-    if let Some(n) = cli.threads
-        && let Err(e) = rayon::ThreadPoolBuilder::new()
-            .num_threads(n.clamp(1, MOST_THREADS))
-            .build_global()
-    {
-        eprintln!("warning: --threads {n} was not taken: {e}");
-    }
-    match run(&session, cli.command) {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            let exit_code = failure.exit_code();
-            match failure.code().filter(|_| session.is_json) {
-                None => refuse(session.is_json, &failure.to_string(), exit_code),
-                Some(code) => {
-                    println!(
-                        "{}",
-                        json!({ "status": "error", "error": failure.to_string(), "code": code,
-                                "exit_code": exit_code })
-                    );
-                    ExitCode::from(exit_code)
-                }
-            }
-        }
-    }
+}
+
+/// Reports why a command failed, with its code for programs where there is one.
+fn report_failure(session: &Session, failure: &Failure) -> ExitCode {
+    let exit_code = failure.exit_code();
+    let Some(code) = failure.code().filter(|_| session.is_json) else {
+        return refuse(session.is_json, &failure.to_string(), exit_code);
+    };
+    println!(
+        "{}",
+        json!({ "status": "error", "error": failure.to_string(), "code": code, "exit_code": exit_code })
+    );
+    ExitCode::from(exit_code)
 }
 
 /// Reports an error: as one JSON object on standard output, or as a line on standard error.

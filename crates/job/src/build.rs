@@ -55,7 +55,7 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
 
 /// A kit that is made but not yet written.
 pub struct Made {
-    /// Finished design.
+    /// Design of the finished kit.
     pub design: Box<Design>,
     /// Notes on changes to the model and to the choices.
     pub notes: Vec<String>,

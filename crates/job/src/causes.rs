@@ -10,7 +10,7 @@ pub enum Cause {
     Input {
         /// Stable name of the remark for machines.
         code: &'static str,
-        /// Sentence for people.
+        /// Sentence that people read.
         sentence: String,
     },
     /// Some pieces are larger than the plate of the printer.

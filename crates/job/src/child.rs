@@ -26,7 +26,7 @@ const LOOK: Duration = Duration::from_millis(40);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 pub enum Event {
-    /// A stage begins.
+    /// A stage of the job begins.
     Stage {
         /// Number of stages in all, for stages of a kit.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -50,7 +50,7 @@ pub enum Event {
         /// Time since the process began, s.
         #[serde(default)]
         seconds: f64,
-        /// Decision in words.
+        /// Decision, in words for people.
         text: String,
     },
     /// All stages have ended.

@@ -45,7 +45,7 @@ pub enum Failure {
     /// No plan was found.
     #[error("{told}")]
     NoPlan {
-        /// Reason, in words.
+        /// Reason, in words for people.
         told: String,
         /// True if the time ran out.
         is_cut_short: bool,

@@ -13,7 +13,7 @@ static N_WRITING: AtomicUsize = AtomicUsize::new(0);
 pub struct Writing(());
 
 impl Writing {
-    /// Begins to write.
+    /// Begins to write a file.
     pub fn begin() -> Self {
         N_WRITING.fetch_add(1, Ordering::SeqCst);
         Self(())

@@ -146,7 +146,7 @@ pub struct Kit {
     pub files: Vec<PieceFile>,
     /// Meshes of the pieces, mm.
     pub pieces: IdVec<PatchId, TriMesh>,
-    /// Order and directions.
+    /// Order and directions of installation.
     pub order: InstallationPlan,
 }
 

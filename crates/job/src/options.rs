@@ -82,13 +82,13 @@ pub struct Options {
     pub effort: Option<f64>,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer.
     pub plan_time: f64,
-    /// Wall thickness.
+    /// Thickness of the walls.
     pub thickness: Thickness,
     /// Material that the kit is printed of; the printer's own if `None`.
     pub material: Option<Material>,
     /// Height of the fall that walls must bear, m.
     pub drop: f64,
-    /// Size of connectors.
+    /// Size of the connectors.
     pub connector: SizeChoice,
     /// Gap between mating faces of connectors, mm; the printer's own if `None`.
     pub clearance: Option<f64>,

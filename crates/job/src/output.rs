@@ -5,12 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use shellock::Warning;
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
 use shellock::design::{Design, Settings};
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
 use shellock::verify::thin_share;
+use shellock::{SegmentedSurface, Warning};
 use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
@@ -239,13 +239,6 @@ pub(crate) fn files(
         .iter()
         .map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
     let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
-    let labels: Vec<i32> = design
-        .kit
-        .surface
-        .patch_of_face
-        .iter()
-        .map(|p| p.number() as i32)
-        .collect();
     let chart = design
         .strength
         .as_ref()
@@ -278,18 +271,20 @@ pub(crate) fn files(
     files.extend(pieces);
     files.extend(archives);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
-    files.push((
-        "segmentation.ply".into(),
-        write_ply(&design.kit.surface.mesh, Some(&labels)),
-    ));
-    files.push((
-        "segmentation.3mf".into(),
-        painted(&model.name, &design.kit.surface).0,
-    ));
+    files.extend(segmentation_files(&model.name, &design.kit.surface));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
     files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
     (files, summary)
+}
+
+/// Builds the files of the surface with its pieces, as labels and as colours.
+fn segmentation_files(name: &str, surface: &SegmentedSurface) -> [(String, Vec<u8>); 2] {
+    let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.number() as i32).collect();
+    [
+        ("segmentation.ply".into(), write_ply(&surface.mesh, Some(&labels))),
+        ("segmentation.3mf".into(), painted(name, surface).0),
+    ]
 }
 
 fn summary(model: &Model, design: &Design, printing: &Printing, thin: &[f64]) -> Summary {

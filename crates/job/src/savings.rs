@@ -49,13 +49,13 @@ const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 pub struct Savings {
     /// Name of the model's file.
     pub model: Option<String>,
-    /// Number of pieces.
+    /// Number of pieces of the kit.
     pub pieces: usize,
     /// Time and material by the name of the printer.
     pub print_time: BTreeMap<String, SavedTime>,
     /// Volume of the pieces over that of the solid model.
     pub volume_ratio: f64,
-    /// Wall thickness, mm.
+    /// Thickness of the walls, mm.
     pub wall_mm: Option<f64>,
 }
 

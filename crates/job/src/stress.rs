@@ -91,7 +91,8 @@ impl StressTest {
         })
     }
 
-    /// Punches the kit and lets it fall. The report contains the comparison with worse plans, if there is one.
+    /// Punches the kit and lets it fall. The report contains the comparison with worse plans, if there is
+    /// one.
     pub fn run(&self, ctx: &Ctx<'_>, compared: Option<Comparison>) -> Result<StressReport, Failure> {
         let tested = stress_test(
             ctx,

@@ -338,32 +338,7 @@ pub fn choose(
     };
     let chosen: Vec<(LimitedSize, f64)> = seams_of
         .into_par_iter()
-        .map(|(pair, seams)| {
-            let stress = |field: StressField<'_>| {
-                seams
-                    .iter()
-                    .flat_map(|s| &s.points)
-                    .map(|p| field(*p))
-                    .fold(0.0, f64::max)
-            };
-            let wanted_mm = size_for_stress_mm(range, params.strength_mpa, stress_mpa.map_or(0.0, stress));
-            let (seam_mm, at) = longest(&seams, params.wall_mm);
-            let cavity_mm = cavity.size_that_fits_mm(params, &seams);
-            let limit = if seam_mm <= cavity_mm {
-                SizeLimit::Seam
-            } else {
-                SizeLimit::Cavity
-            };
-            let given_mm = wanted_mm.min(seam_mm).min(cavity_mm).max(range.min_mm);
-            let limited = LimitedSize {
-                pair,
-                at,
-                wanted_mm,
-                given_mm,
-                limit,
-            };
-            (limited, range.max_mm.min(seam_mm).min(cavity_mm).max(given_mm))
-        })
+        .map(|(pair, seams)| size_of_pair(params, range, &cavity, (pair, &seams), stress_mpa))
         .collect();
     ctx.check()?;
     let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.0.pair, c.0.given_mm)));
@@ -382,6 +357,41 @@ pub fn choose(
         most,
         raised: Vec::new(),
     })
+}
+
+/// Size of the connectors of a pair with these seams, by the stress there and by what fits, and the largest
+/// size that would fit, mm.
+fn size_of_pair(
+    params: &SizeParams,
+    range: &SizeRange,
+    cavity: &Cavity,
+    (pair, seams): ([PatchId; 2], &[Seam]),
+    stress_mpa: Option<StressField<'_>>,
+) -> (LimitedSize, f64) {
+    let stress = |field: StressField<'_>| {
+        seams
+            .iter()
+            .flat_map(|s| &s.points)
+            .map(|p| field(*p))
+            .fold(0.0, f64::max)
+    };
+    let wanted_mm = size_for_stress_mm(range, params.strength_mpa, stress_mpa.map_or(0.0, stress));
+    let (seam_mm, at) = longest(seams, params.wall_mm);
+    let cavity_mm = cavity.size_that_fits_mm(params, seams);
+    let limit = if seam_mm <= cavity_mm {
+        SizeLimit::Seam
+    } else {
+        SizeLimit::Cavity
+    };
+    let given_mm = wanted_mm.min(seam_mm).min(cavity_mm).max(range.min_mm);
+    let limited = LimitedSize {
+        pair,
+        at,
+        wanted_mm,
+        given_mm,
+        limit,
+    };
+    (limited, range.max_mm.min(seam_mm).min(cavity_mm).max(given_mm))
 }
 
 /// The largest size with which the longest of `seams` is a contact, mm, and the middle of that seam.

@@ -192,8 +192,8 @@ impl<'a> Fonts<'a> {
             .collect()
     }
 
-    /// Font of a character, given that of the one before. Joiners and variation selectors stay with it, and so
-    /// do marks and letters that it has where the program's fonts lack them.
+    /// Font of a character, given that of the one before. Joiners and variation selectors stay with it, and
+    /// so do marks and letters that it has where the program's fonts lack them.
     fn font_of(&self, c: char, before: Option<FontId>, is_bold: bool) -> FontId {
         let own = own_font(is_bold);
         if let Some(before) = before.filter(|_| is_invisible(c)) {

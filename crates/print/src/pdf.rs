@@ -1,8 +1,8 @@
 //! Pages of text, pictures and filled shapes as PDF 1.7. Lengths in mm, from the upper left corner of an A4
 //! page.
 //!
-//! The file holds the letters that it uses, of the fonts that [`Fonts`] chose, and the text that they stand for,
-//! so it can be searched and copied. It has no date and no random id.
+//! The file holds the letters that it uses, of the fonts that [`Fonts`] chose, and the text that they stand
+//! for, so it can be searched and copied. It has no date and no random id.
 
 use std::sync::Arc;
 
@@ -162,8 +162,8 @@ impl<'f> Page<'f> {
     }
 }
 
-/// Writes the pages as a PDF file. Deterministic: equal pages give equal bytes. `None` if a font that was lent
-/// cannot be embedded.
+/// Writes the pages as a PDF file. Deterministic: equal pages give equal bytes. `None` if a font that was
+/// lent cannot be embedded.
 pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Option<Vec<u8>> {
     let mut document = Document::new_with(SerializeSettings {
         configuration: Configuration::new_with_version(PdfVersion::Pdf17),

@@ -1,4 +1,5 @@
-//! Causes of warnings about walls, and about the loads that a plan carries. Lengths in mm, areas in mm², stresses in MPa.
+//! Causes of warnings about walls, and about the loads that a plan carries. Lengths in mm, areas in mm²,
+//! stresses in MPa.
 
 use shellock_report::words::{number, pieces as named, plural};
 use shellock_report::{Diagnostic, PatchId, Told};

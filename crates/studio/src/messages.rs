@@ -33,7 +33,7 @@ pub struct Project {
     pub is_opening: bool,
     /// Reason why the last model could not be opened.
     pub problem: Option<String>,
-    /// Open model.
+    /// The model that is open.
     pub model: Option<Model>,
     /// Pieces of the model.
     pub division: Option<Division>,
@@ -45,7 +45,7 @@ pub struct Project {
     pub program: &'static str,
 }
 
-/// An open model.
+/// The model that is open.
 #[derive(Debug, Serialize)]
 pub struct Model {
     /// Name of its file.
@@ -69,7 +69,7 @@ pub struct Model {
 /// Pieces of the model.
 #[derive(Debug, Serialize)]
 pub struct Division {
-    /// Number of pieces.
+    /// Number of pieces of the kit.
     pub n_pieces: usize,
     /// Source of the pieces: `painted` or `automatic`.
     pub origin: &'static str,
@@ -97,7 +97,7 @@ pub struct MadeKit {
 pub struct KitFile {
     /// Name within the kit's folder.
     pub name: String,
-    /// Size, bytes.
+    /// Size of the file, bytes.
     pub bytes: u64,
 }
 
@@ -106,7 +106,7 @@ pub struct KitFile {
 pub struct Divided {
     /// Revision of the project that has the pieces.
     pub revision: u64,
-    /// Number of pieces.
+    /// Number of pieces of the kit.
     pub n_pieces: usize,
     /// Name of the method that divides by itself.
     pub method: &'static str,
@@ -124,7 +124,7 @@ pub struct Judgement {
     pub revision: u64,
     /// True if the pieces lock.
     pub locks: bool,
-    /// Judgement in words.
+    /// Judgement, in words for people.
     pub words: String,
     /// Number of pieces after mending.
     pub n_pieces: usize,
@@ -153,18 +153,18 @@ pub struct Blocker {
     pub piece: u32,
     /// Number of the piece in its way.
     pub by: u32,
-    /// Sentence on both.
+    /// Sentence that compares the two.
     pub words: String,
     /// Place of the obstacle.
     pub at: [f64; 3],
 }
 
-/// Advice on pieces.
+/// Advice on the painted pieces.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
     /// Weight of the advice.
     pub severity: Severity,
-    /// Advice in words.
+    /// Advice, in words for people.
     pub words: String,
     /// Place that it is about.
     pub at: Option<[f64; 3]>,
@@ -202,7 +202,7 @@ pub struct Key {
     pub area_mm2: f64,
     /// Worth of the place.
     pub score: f64,
-    /// Place in words.
+    /// Place, in words for people.
     pub words: String,
     /// True for the key of the plan.
     pub is_chosen: bool,

@@ -29,7 +29,7 @@ impl Pieces {
         }
     }
 
-    /// Number of pieces.
+    /// Number of pieces of the kit.
     pub fn n(&self) -> usize {
         self.labels.iter().collect::<BTreeSet<_>>().len()
     }

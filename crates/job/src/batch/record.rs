@@ -91,13 +91,13 @@ pub struct Record {
     pub seconds: f64,
     /// Peak memory, MB; `None` if the system does not report it.
     pub peak_mb: Option<f64>,
-    /// Number of pieces.
+    /// Number of pieces of the kit.
     pub pieces: Option<u64>,
     /// Volume of the pieces over that of the solid model.
     pub volume_ratio: Option<f64>,
-    /// Number of warnings.
+    /// Number of its warnings, notes apart.
     pub n_warnings: usize,
-    /// Number of problems.
+    /// Number of its problems, which are severe.
     pub n_problems: usize,
     /// Messages, most severe first.
     pub said: Vec<String>,

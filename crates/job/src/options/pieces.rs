@@ -7,7 +7,7 @@ use std::str::FromStr;
 pub enum Pieces {
     /// As many as the method finds.
     Auto,
-    /// About this number.
+    /// About this number of pieces.
     Number(usize),
     /// As few as fit the printer.
     FitsBed,

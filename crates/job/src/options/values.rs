@@ -49,11 +49,11 @@ pub fn number<T: FromStr<Err: Display>>(text: &str) -> Result<T, String> {
 /// An axis of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// The first axis.
+    /// The first axis of the file.
     X,
-    /// The second axis.
+    /// The second axis of the file.
     Y,
-    /// The third axis.
+    /// The third axis of the file.
     Z,
 }
 
@@ -87,15 +87,15 @@ impl Word for Axis {
 pub enum Unit {
     /// A thousandth of a millimetre.
     Micron,
-    /// A millimetre.
+    /// A millimetre, the unit of printers.
     Mm,
-    /// A centimetre.
+    /// A centimetre, 10 mm long.
     Cm,
-    /// An inch.
+    /// An inch, 25.4 mm long.
     Inch,
-    /// A foot.
+    /// A foot, 304.8 mm long.
     Foot,
-    /// A metre.
+    /// A metre, 1000 mm long.
     M,
 }
 
@@ -129,9 +129,9 @@ impl Word for Unit {
 /// Paper size of the booklet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PaperSize {
-    /// 210 × 297 mm.
+    /// Sheets of 210 × 297 mm.
     A4,
-    /// 8.5 × 11 inches.
+    /// Sheets of 8.5 × 11 inches.
     Letter,
 }
 
@@ -197,9 +197,9 @@ pub enum LabelsFrom {
     Paint,
     /// Colours of faces or of points.
     Colors,
-    /// Materials.
+    /// Materials of the file.
     Materials,
-    /// Groups of faces.
+    /// Groups of faces of the file.
     Groups,
     /// Named sets of triangles.
     Sets,

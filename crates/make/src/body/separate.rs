@@ -74,6 +74,54 @@ pub fn build(
     plan: &LatticePlan,
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<ShellBodies, BodyError> {
+    let separated = separate(ctx, grid, distances, plan, rooms)?;
+    ctx.stage("bodies", plan.steps.len())?;
+    let cuts = &separated.cuts;
+    let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
+    let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
+    let gap = |n: usize| gap_mm(params, key_side.as_deref(), n);
+    let gap_mm: Vec<f32> = (0..grid.band.len()).into_par_iter().map(gap).collect();
+    let mut parts = split(
+        &Splitter {
+            ctx,
+            params,
+            grid,
+            gap_mm: &gap_mm,
+        },
+        grid.wall.clone(),
+        cuts,
+    )?;
+    parts.sort_by_key(|(p, _)| *p);
+    let apart_mm = 2.0 * params.seam_gap_mm.max(params.key_gap_mm.unwrap_or(0.0));
+    let parts = whole_bodies(ctx, grid, apart_mm, parts);
+    Ok(ShellBodies {
+        bodies: parts.into_iter().map(|(_, body)| body).collect(),
+        inner: separated.inner,
+        blocked: of_every_piece(separated.blocked),
+        side: of_every_piece(separated.side),
+        gap_mm,
+    })
+}
+
+/// Cuts of all pieces, with what follows from them alone.
+struct Separated {
+    /// Cut of each piece, in order of removal.
+    cuts: Vec<Cut>,
+    /// Inner surface of the wall with its pieces, if there is a cavity.
+    inner: Option<SegmentedSurface>,
+    /// Region that each piece must keep free, and the region on its side of the cuts.
+    blocked: Vec<Option<LocalField>>,
+    side: Vec<Option<LocalField>>,
+}
+
+/// Cuts the pieces off in the order of their removal.
+fn separate(
+    ctx: &Ctx,
+    grid: &ShellGrid,
+    distances: &PatchDistances,
+    plan: &LatticePlan,
+    rooms: &IdVec<PatchId, Aabb>,
+) -> Result<Separated, BodyError> {
     ctx.stage("cuts", plan.steps.len())?;
     let mut fields = Separation::new(grid, distances, plan.steps.len());
     let mut inner = InnerSurface::new(grid);
@@ -117,30 +165,11 @@ pub fn build(
         blocked[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
         ctx.step()?;
     }
-    ctx.stage("bodies", plan.steps.len())?;
-    let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
-    let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
-    let gap = |n: usize| gap_mm(params, key_side.as_deref(), n);
-    let gap_mm: Vec<f32> = (0..grid.band.len()).into_par_iter().map(gap).collect();
-    let mut parts = split(
-        &Splitter {
-            ctx,
-            params,
-            grid,
-            gap_mm: &gap_mm,
-        },
-        grid.wall.clone(),
-        &cuts,
-    )?;
-    parts.sort_by_key(|(p, _)| *p);
-    let apart_mm = 2.0 * params.seam_gap_mm.max(params.key_gap_mm.unwrap_or(0.0));
-    let parts = whole_bodies(ctx, grid, apart_mm, parts);
-    Ok(ShellBodies {
-        bodies: parts.into_iter().map(|(_, body)| body).collect(),
+    Ok(Separated {
+        cuts,
         inner: inner.finish(plan.steps.len()),
-        blocked: of_every_piece(blocked),
-        side: of_every_piece(side),
-        gap_mm,
+        blocked,
+        side,
     })
 }
 

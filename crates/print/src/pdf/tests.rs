@@ -17,8 +17,8 @@ pub(crate) fn read(bytes: &[u8]) -> Vec<String> {
     pages.keys().map(text).collect()
 }
 
-/// Number of pictures that the pages of a file show. Equal pictures are stored once, so images of the file are
-/// fewer.
+/// Number of pictures that the pages of a file show. Equal pictures are stored once, so images of the file
+/// are fewer.
 pub(crate) fn n_pictures(bytes: &[u8]) -> usize {
     let file = lopdf::Document::load_mem(bytes).expect("the file is a PDF");
     let content = |id: lopdf::ObjectId| {

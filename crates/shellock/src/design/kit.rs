@@ -166,13 +166,12 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     // Connectors under its seams.
     let (runs, contacts) = connectors(settings, sizes, grid, &shell, plan);
     // Pieces, joined and carved.
-    let (relief, label) = (settings.relief(), params.label);
     let finish = FinishParams {
         connector: &settings.connector,
-        relief,
+        relief: settings.relief(),
         rim_mm: settings.body.rim_mm,
         grip: *grip,
-        label,
+        label: params.label,
         turn: *handover.turn(),
     };
     let made = piece::make(&ctx, &finish, grid, &shell, plan, &runs, &rooms)?;
@@ -182,10 +181,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     // The verdict, from the finished meshes alone.
     let judging = ctx.fork();
     let judged = judged(&judging, settings, model, &finished, &plan)?;
-    let mut warnings = handover.warnings(ctx.into_warnings());
-    warnings.extend(judging.into_warnings());
-    warnings.extend(play::warning_of_rattles(&judged.rattles));
-    warnings.extend(play::warning(&judged.play));
+    let warnings = judged.warnings(handover.warnings(ctx.into_warnings()), judging.into_warnings());
     Ok(Kit {
         surface: handover.surface(surface),
         sizes: handover.sizes(sizes),
@@ -241,6 +237,16 @@ struct Judged {
     touching: Vec<verify::contact::Contact>,
     play: KitPlay,
     rattles: Vec<Rattle>,
+}
+
+impl Judged {
+    /// Warnings of the making and of the judging, and those of the pieces' play.
+    fn warnings(&self, of_making: Vec<Warning>, of_judging: Vec<Warning>) -> Vec<Warning> {
+        let mut warnings = [of_making, of_judging].concat();
+        warnings.extend(play::warning_of_rattles(&self.rattles));
+        warnings.extend(play::warning(&self.play));
+        warnings
+    }
 }
 
 /// Verifies the finished meshes, and measures their contacts and play. The checks include those on play.
