@@ -78,7 +78,7 @@ pub struct Options {
     pub key: Key,
     /// Time for the whole job, s; 0 takes the time it takes.
     pub time: f64,
-    /// Work for the whole job, processor seconds of an ordinary computer; > 0. It takes the place of `time`.
+    /// Work for the whole job, s on an ordinary computer of two cores; > 0. It takes the place of `time`.
     pub effort: Option<f64>,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer.
     pub plan_time: f64,

@@ -391,8 +391,8 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Work instead of time: the same kit on any machine",
-        "Work for the whole job instead of time, in processor seconds of an ordinary computer as the \
-             size of the pieces lets expect them: the kit is the same on any machine",
+        "Work for the whole job instead of time, in seconds that it is expected to take on an ordinary \
+             computer of two cores: the kit is the same on any machine",
     )
     .not_with(&["time"])
     .with_hyphens(),

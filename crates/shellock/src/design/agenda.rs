@@ -259,6 +259,11 @@ impl Agenda {
         self.n_keys = n_keys;
     }
 
+    /// Measures the first wall, which tells how fast the machine is.
+    pub fn end_first_wall(&mut self, ctx: &Ctx) {
+        self.clock.end_first_wall(ctx);
+    }
+
     /// Learns what is expected of the present pieces.
     pub fn foresee(&mut self, ctx: &Ctx, cost: Cost) {
         self.clock.foresee(ctx, cost);

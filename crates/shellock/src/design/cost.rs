@@ -7,7 +7,7 @@
 
 use crate::SegmentedSurface;
 
-/// Expected cost of each part of a job, s of the reference machine.
+/// Expected cost of each part of a job, s on the reference machine: two cores with nothing beside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Cost {
     /// Thickness of the wall.
@@ -20,13 +20,13 @@ pub(super) struct Cost {
     pub kit_s: f64,
 }
 
-/// Cost of one part, processor seconds: in all, for 100 cm² of surface, for 100 000 triangles, for a piece.
+/// Cost of one part, s: in all, for 100 cm² of surface, for 100 000 triangles, for a piece.
 type Coefficients = [f64; 4];
 
 const WALL: Coefficients = [1.3, 0.1, 0.5, 0.0];
 const DIVISION: Coefficients = [1.0, 0.2, 0.7, 0.05];
-const PLAN: Coefficients = [0.0, 0.2, 0.0, 0.15];
-const KIT: Coefficients = [5.0, 1.6, 0.0, 0.5];
+const PLAN: Coefficients = [0.0, 0.15, 0.0, 0.1];
+const KIT: Coefficients = [3.0, 1.0, 0.0, 0.3];
 
 impl Cost {
     /// Expected cost of a job whose pieces are those of `surface`, mm.

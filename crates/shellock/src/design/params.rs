@@ -57,8 +57,8 @@ pub struct Params {
     pub is_play_together: bool,
     /// Limits on planning and making another kit after one failed its verification.
     pub rounds: Rounds,
-    /// Work after which nothing else is tried, processor seconds of a reference machine; > 0. Unlike a limit
-    /// of time, it gives the same kit on any machine. None.
+    /// Work after which nothing else is tried, s on a reference machine of two cores; > 0. Unlike a limit of
+    /// time, it gives the same kit on any machine. None.
     pub effort_s: Option<f64>,
 }
 

@@ -14,6 +14,8 @@ const SPREAD: f64 = 1.5;
 /// Share of that time that must be left where nothing is lost by an attempt: estimates may be wrong by a
 /// factor of two.
 const HOPE: f64 = 0.4;
+/// Shortest time that tells how fast the machine is, s.
+const LEAST_MEASURED_S: f64 = 0.3;
 /// Bounds of the machine's slowness, relative to the reference: what lies outside them is a wrong estimate.
 const SLOWNESS: std::ops::RangeInclusive<f64> = 0.2..=10.0;
 
@@ -22,6 +24,8 @@ pub(super) struct Clock {
     total_s: f64,
     /// Work that may be done and work that is done, s of the reference machine; `None` with a time limit.
     work_s: Option<[f64; 2]>,
+    /// Time that the first wall took; 0 if that is not known.
+    first_wall_s: f64,
     /// Seconds left when the present wall and trial began.
     wall_s: f64,
     trial_s: f64,
@@ -42,6 +46,7 @@ impl Clock {
         Self {
             total_s,
             work_s: None,
+            first_wall_s: 0.0,
             wall_s: total_s,
             trial_s: total_s,
             slowest_s: 0.0,
@@ -68,19 +73,27 @@ impl Clock {
         }
     }
 
+    /// Measures the first wall.
+    pub fn end_first_wall(&mut self, ctx: &Ctx) {
+        self.first_wall_s = self.total_s - self.left_s(ctx);
+    }
+
     /// Learns what is expected of the present pieces, and at first how fast the machine is.
     pub fn foresee(&mut self, ctx: &Ctx, cost: Cost) {
         let is_first = self.cost == Cost::default();
         self.cost = cost;
-        let begun_s = cost.wall_s + cost.division_s;
-        if is_first {
-            self.count_division(true);
+        if !is_first {
+            return;
         }
-        if is_first && self.work_s.is_none() && begun_s > 0.0 {
-            let slowness = (self.total_s - self.left_s(ctx)) / begun_s;
-            if slowness.is_finite() {
-                self.slowness = slowness.clamp(*SLOWNESS.start(), *SLOWNESS.end());
-            }
+        self.count_division(true);
+        // The time of the wall is foreseen better than that of the division, but a given wall takes none.
+        let slowness = if self.first_wall_s > LEAST_MEASURED_S {
+            self.first_wall_s / cost.wall_s
+        } else {
+            (self.total_s - self.left_s(ctx)) / (cost.wall_s + cost.division_s)
+        };
+        if self.work_s.is_none() && slowness.is_finite() {
+            self.slowness = slowness.clamp(*SLOWNESS.start(), *SLOWNESS.end());
         }
     }
 
@@ -238,6 +251,16 @@ mod tests {
             });
         }
         after(10.0, |ctx, clock, _| assert_eq!(clock.needed_s(ctx), None));
+    }
+
+    #[test]
+    fn the_wall_tells_how_fast_the_machine_is_where_it_was_measured() {
+        after(6.0, |ctx, clock, gone| {
+            clock.end_first_wall(ctx);
+            *gone.lock().expect("no test panics with it") = 60.0;
+            clock.foresee(ctx, COST);
+            assert!((clock.kit_reserve_s() - SPREAD * 16.0 * 2.0).abs() < 1e-9);
+        });
     }
 
     #[test]
