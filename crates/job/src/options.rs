@@ -17,7 +17,7 @@ pub use pieces::{Key, Pieces};
 use shellock::connector::ConnectorParams;
 use shellock::design::{self, KeySource, Params};
 use shellock::segmentation::{KeepWhole, Method};
-use shellock::sizes::SizeChoice;
+use shellock::sizes::{SizeChoice, SizeRange};
 use shellock_mechanics::Material;
 use shellock_print::Printer;
 pub use table::{DECLARED, Declared, Kind, declared};
@@ -152,7 +152,7 @@ impl Default for Options {
             thickness: Thickness::Auto,
             material: None,
             drop: params.drop_m,
-            connector: params.connector.size,
+            connector: SizeChoice::Auto(SizeRange::default()),
             clearance: None,
             key_clearance: None,
             detent: 0.0,
