@@ -87,7 +87,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let run = |args: &[&str]| shellock(dir.path(), args);
     let job = |threads: &str, out: &str| {
-        let job = "demo --figure vase --size 80 --pieces 6 --time 0 --json --threads";
+        let job = "demo --figure vase --size 80 --pieces 6 --effort 20 --json --threads";
         run(&job.split(' ').chain([threads, "-o", out]).collect::<Vec<_>>())
     };
     let first = job("1", "one");
@@ -121,6 +121,21 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     assert_eq!(savings["print_time"]["sla"]["by"], "closed form");
     fs::copy(kit.join("pieces/piece-02.stl"), kit.join("pieces/piece-01.stl")).unwrap();
     assert_eq!(code(&run(&["verify", "one", "vase.stl"])), 1);
+}
+
+#[test]
+fn a_time_that_is_over_before_any_kit_leaves_nothing_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let o = shellock(dir.path(), &["demo", "--time", "0.5", "-o", "kit"]);
+    assert_eq!(code(&o), 3, "{}", errors(&o));
+    assert!(
+        errors(&o).contains("the time was over before a kit was made"),
+        "{}",
+        errors(&o)
+    );
+    assert!(!dir.path().join("kit").exists());
+    let both = shellock(dir.path(), &["demo", "--time", "9", "--effort", "9", "-o", "kit"]);
+    assert_eq!(code(&both), 2, "{}", errors(&both));
 }
 
 #[test]

@@ -37,7 +37,7 @@ const IN_FULL: [&str; 4] = ["README.md", "batch.md", "getting-started.md", "refe
 
 /// Options added to a command that does not set them, for few pieces and a quick run.
 const SOON: [(&str, &str); 4] = [
-    ("--time", "0"),
+    ("--effort", "20"),
     ("--method", "creases"),
     ("--pieces", "4"),
     ("--plan-time", "1"),
@@ -89,7 +89,10 @@ fn added(args: &[&str]) -> Vec<String> {
             if args[0] == "demo" {
                 more.extend(words("--figure torus --size 60"));
             }
-            let unsaid = SOON.iter().filter(|(option, _)| !has(option));
+            let is_limited = |option: &str| option == "--effort" && has("--time");
+            let unsaid = SOON
+                .iter()
+                .filter(|(option, _)| !has(option) && !is_limited(option));
             more.extend(unsaid.flat_map(|&(option, value)| [option.to_owned(), value.to_owned()]));
             more
         }
