@@ -76,7 +76,7 @@ fn every_format_gives_the_tetrahedron_back() {
                 file_face,
                 format,
                 unit_mm: None,
-                unit_is_stated: false,
+                has_unit: false,
                 objects: Vec::new(),
                 empty_plates: Vec::new(),
                 cutters: Vec::new(),
@@ -190,7 +190,7 @@ fn broken_stl_is_refused_with_its_place() {
     let too_few = ReadError::TooFewBytes {
         at: Place::Byte(80),
         what: "triangles",
-        promised: 4,
+        count: 4,
         room: 3,
     };
     assert_eq!(stl(&bytes[..270]), too_few);
@@ -520,14 +520,14 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
             name: "leg <\"1\" & 2>\u{1}",
             color: [255, 0, 16],
             mesh: &mesh,
-            turned: None,
+            rotation: None,
             moved_mm: [0.0; 3],
         },
         NamedObject {
             name: "Kopf ä",
             color: [1, 2, 3],
             mesh: &mesh,
-            turned: Some(quarter),
+            rotation: Some(quarter),
             moved_mm: [10.0, 0.5, -3.0],
         },
     ];

@@ -151,7 +151,7 @@ fn a_node_has_one_parent_and_is_shown_once() {
     file.json["nodes"][2] = json!({});
     for roots in [json!([0, 1]), json!([1, 0]), json!([1])] {
         file.json["scenes"][0]["nodes"] = roots;
-        assert_close(&file.points(), &moved(|p| p + Vec3::new(5.0, 0.0, 0.0)));
+        assert_close(&file.points(), &transform(|p| p + Vec3::new(5.0, 0.0, 0.0)));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Objects and plates that are chosen: numbers count as slicers count them, and refusals say what there is.
 
-use super::super::super::{Selection, read_selected};
+use super::super::super::{Selection, read_selection};
 use super::roles::{cube, items};
 use super::*;
 
@@ -38,7 +38,7 @@ fn figure_and_base(names: [&str; 2]) -> Vec<u8> {
 
 fn choose(bytes: &[u8], object: Option<&str>, plate: Option<&str>) -> Result<Loaded, ReadError> {
     let [object, plate] = [object, plate].map(|name| name.map(str::to_owned));
-    read_selected(bytes, None, &Selection { object, plate })
+    read_selection(bytes, None, &Selection { object, plate })
 }
 
 #[test]
