@@ -52,7 +52,7 @@ fn message(text: impl AsRef<[u8]>) -> String {
 
 /// Asserts that a note of `loaded` contains `words`.
 #[track_caller]
-pub(crate) fn assert_told(loaded: &Loaded, words: &str) {
+pub(crate) fn assert_note(loaded: &Loaded, words: &str) {
     let is_told = loaded.notes.iter().any(|note| note.contains(words));
     assert!(is_told, "{words:?} is not in {:?}", loaded.notes);
 }
@@ -380,7 +380,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     let loaded = read(&ascii).unwrap();
     assert_eq!(loaded, read(&binary).unwrap());
     assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
-    assert_told(&loaded, "1 of 2 faces have a \"label\" below 0");
+    assert_note(&loaded, "1 of 2 faces have a \"label\" below 0");
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
     assert!(matches!(
@@ -402,7 +402,7 @@ fn labels_of_a_float_property_divide_where_they_are_whole() {
     assert_eq!(ply("4.0").face_labels(), Some(&[1, 4][..]));
     let odd = ply("0.5");
     assert_eq!(odd.face_labels(), None);
-    assert_told(&odd, "not all are whole numbers");
+    assert_note(&odd, "not all are whole numbers");
 }
 
 #[test]

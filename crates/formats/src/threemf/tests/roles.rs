@@ -63,8 +63,8 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
             (12, 1000.0),
             "{kind}"
         );
-        assert_told(&loaded, word);
-        assert_told(&loaded, "\"extra\"");
+        assert_note(&loaded, word);
+        assert_note(&loaded, "\"extra\"");
     }
     let marks = [
         "support_mesh",
@@ -80,7 +80,7 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
             let build = format!("<item objectid=\"1\"/><item objectid=\"2\">{of_item}</item>");
             let loaded = read_model(&resources, &build).unwrap();
             assert_eq!(volume(&loaded), 1000.0, "{mark}");
-            assert_told(&loaded, "left out as");
+            assert_note(&loaded, "left out as");
             let off = read_model(&resources.replace("rue", "alse"), &build.replace("rue", "alse")).unwrap();
             assert_eq!(off.mesh.triangles.len(), 24, "{mark} is off");
         }
@@ -111,7 +111,7 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
         "{}",
         volume(&loaded)
     );
-    assert_told(&loaded, "cut out as a negative volume: \"hole\"");
+    assert_note(&loaded, "cut out as a negative volume: \"hole\"");
     assert!(loaded.file_face.is_sorted() && loaded.n_file_faces() > 24);
     assert_eq!(loaded.file_face.len(), loaded.mesh.triangles.len());
     // A range of an object's triangles, as in PrusaSlicer.
@@ -137,12 +137,12 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
         "component objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 500 0 0\"",
     );
     let loaded = with_settings(&parts, &items(&[3, 4]), BAMBU, &away).unwrap();
-    assert_told(&loaded, "does not meet");
+    assert_note(&loaded, "does not meet");
     // A cutter that lacks a triangle, and one that takes all away.
     let lacking = parts_of(&bar(2, "", "").replacen("<triangle v1", "<lost v1", 1));
     let loaded = with_settings(&lacking, &items(&[3]), BAMBU, bambu).unwrap();
     assert!((volume(&loaded) - 992.0).abs() < 1e-9, "{}", volume(&loaded));
-    assert_told(&loaded, "its surface had holes, which were closed");
+    assert_note(&loaded, "its surface had holes, which were closed");
     let all = parts_of(&box_of(2, "", "", [-1.0; 3], [11.0; 3]));
     let refused = with_settings(&all, &items(&[3]), BAMBU, bambu)
         .unwrap_err()
