@@ -80,7 +80,7 @@ impl Shell {
         }
     }
 
-    fn certified(&self) -> Certificate {
+    fn make_certificate(&self) -> Certificate {
         let (verdict, gaps) = (Verification::default(), KitGaps::default());
         let evidence = Evidence {
             contacts: &self.contacts,
@@ -130,11 +130,11 @@ fn seam_point(centers: &[Vec3], at: Vec3) -> Option<(usize, usize, Vec3)> {
 #[divan::bench(args = [13, 40], sample_count = 5)]
 fn certificate(bencher: Bencher, n_pieces: usize) {
     let shell = Shell::new(n_pieces);
-    let claims = shell.certified().claims;
+    let claims = shell.make_certificate().claims;
     assert!(
         matches!(claims[0], Claim::Locked { .. }),
         "no proof was found: {:?}",
         claims[0]
     );
-    bencher.bench(|| shell.certified());
+    bencher.bench(|| shell.make_certificate());
 }

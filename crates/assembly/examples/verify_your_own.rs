@@ -60,7 +60,7 @@ fn main() {
             seed: 0,
         };
         let verdict = verify(&Ctx::quiet(), &params, &assembly).expect("nobody stops it");
-        let is_lock = verdict.verification.passed();
+        let is_lock = verdict.verification.has_passed();
         println!(
             "{name}: {}",
             if is_lock { "it locks" } else { "it does not lock" }

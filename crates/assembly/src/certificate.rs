@@ -15,9 +15,9 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use bounded::bounded;
+use bounded::list_bounds;
 pub use bounded::{BearingPoint, Bounded};
-use proof::{Proof, Question, prove};
+use proof::{LockProof, Question, prove};
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
@@ -256,8 +256,8 @@ pub fn certify(
     let mut claims: Vec<Claim> = claim_lock(plan, contacts, center, length_mm)
         .into_iter()
         .collect();
-    let contacts = keep_holding(contacts, &mut claims);
-    let (bearings, proven) = play.map_or_else(Default::default, bounded);
+    let contacts = keep_contacts(contacts, &mut claims);
+    let (bearings, proven) = play.map_or_else(Default::default, list_bounds);
     claims.extend(proven.into_iter().map(Claim::Bounded));
     claims.extend(claim_paths(plan, verdict, gaps));
     for file in &mut files {
@@ -316,13 +316,13 @@ fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, lengt
         &centered,
         &Question {
             n_pieces: plan.steps.len(),
-            held: &held,
+            at_rest: &held,
             leaves,
             length_mm,
             freedom,
         },
     )?;
-    let Proof {
+    let LockProof {
         multipliers,
         residual,
         hold,
@@ -379,7 +379,7 @@ fn claim_paths(plan: &InstallationPlan, verdict: &Verification, gaps: &KitGaps) 
 }
 
 /// Keeps the contacts that proofs use, and renumbers them in the proofs.
-fn keep_holding(contacts: &[Contact], claims: &mut [Claim]) -> Vec<HoldingContact> {
+fn keep_contacts(contacts: &[Contact], claims: &mut [Claim]) -> Vec<HoldingContact> {
     let named = |claim: &Claim| match claim {
         Claim::Locked { multipliers, .. } => multipliers.iter().map(|m| m.0).collect(),
         _ => Vec::new(),

@@ -138,7 +138,7 @@ pub fn measure(
         .map(|a| a.linear.first().map(|&linear| play_of(linear, false)))
         .collect();
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
-    let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
+    let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.bearings.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
     let mut together = None;
     if params.is_together && proofs.len() == ids.len() {

@@ -36,7 +36,7 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
     let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
     let is_sound = is_plan && !verification.findings.iter().any(is_open) && !reaches_far_out(assembly);
     let play = if is_sound {
-        Some(played(ctx, params, assembly, &mut verification)?)
+        Some(measure_play(ctx, params, assembly, &mut verification)?)
     } else {
         None
     };
@@ -50,7 +50,7 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
 }
 
 /// Measures the play of the pieces, and adds it to the verdict.
-fn played(
+fn measure_play(
     ctx: &Ctx,
     params: &VerifyParams,
     assembly: &Assembly<'_>,

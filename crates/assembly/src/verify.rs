@@ -244,7 +244,7 @@ pub struct Verification {
 
 impl Verification {
     /// Returns true if every check holds.
-    pub fn passed(&self) -> bool {
+    pub fn has_passed(&self) -> bool {
         self.checks.iter().all(|c| c.ok)
     }
 
@@ -304,7 +304,7 @@ pub fn examine(
     ctx.stage("verify", 0)?;
     let mut verdict = Verification::default();
     verdict.add(check_plan(pieces, plan));
-    let is_plan = verdict.passed();
+    let is_plan = verdict.has_passed();
     let bodies = body::read(ctx, pieces)?;
     let (checks, findings) = body::check(&bodies);
     verdict.checks.extend(checks);
@@ -407,6 +407,6 @@ fn check_motion(
 
 /// Rounds `x` to six decimals: no printer or judge resolves more, and the order in which threads add up does
 /// not show.
-fn rounded(x: f64) -> f64 {
+fn round(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }

@@ -17,7 +17,7 @@ fn directions() -> impl Strategy<Value = LatticeDirection> {
     prop::sample::select(LatticeDirection::all().collect::<Vec<_>>())
 }
 
-fn turned(turn: &LatticeTurn, d: LatticeDirection) -> LatticeDirection {
+fn turn_along(turn: &LatticeTurn, d: LatticeDirection) -> LatticeDirection {
     LatticeDirection::nearest(turn.apply(d.unit()))
 }
 
@@ -43,7 +43,7 @@ struct Placed {
 
 impl Placed {
     /// Verdict of `judge` on the pinned lid in this placement.
-    fn judged(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Verification {
+    fn judge(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Verification {
         let model = self.turn.mesh(&brick(ALL, ALL, ALL).to_mesh(), self.shift);
         let parts = lid
             .parts()
@@ -69,8 +69,8 @@ impl Placed {
     }
 
     /// Checks, and findings worded independently of the placement.
-    fn said(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Said {
-        let verdict = self.judged(lid, ways, judge);
+    fn verdict(&self, lid: &PinnedLid, ways: [Vec3; 3], judge: Judge) -> Said {
+        let verdict = self.judge(lid, ways, judge);
         let checks = verdict.checks.iter().map(|c| (c.name.clone(), c.ok));
         (
             checks.collect(),
@@ -111,7 +111,7 @@ impl Placed {
     }
 }
 
-fn placed() -> impl Strategy<Value = Placed> {
+fn places() -> impl Strategy<Value = Placed> {
     (turns(), vectors(100.0), orders(3)).prop_map(|(turn, shift, number)| Placed { turn, shift, number })
 }
 
@@ -131,7 +131,7 @@ fn lids() -> impl Strategy<Value = (PinnedLid, [Vec3; 3])> {
     })
 }
 
-fn as_given() -> Placed {
+fn identity() -> Placed {
     Placed {
         turn: LatticeTurn::all()[0],
         shift: Vec3::ZERO,
@@ -144,9 +144,9 @@ proptest! {
 
     #[test]
     fn a_verdict_is_the_same_however_an_assembly_lies_and_its_pieces_are_numbered(
-        (lid, ways) in lids(), placed in placed(),
+        (lid, ways) in lids(), placed in places(),
     ) {
-        prop_assert_eq!(placed.said(&lid, ways, judge_fast), as_given().said(&lid, ways, judge_fast));
+        prop_assert_eq!(placed.verdict(&lid, ways, judge_fast), identity().verdict(&lid, ways, judge_fast));
     }
 }
 
@@ -154,9 +154,9 @@ proptest! {
     #![proptest_config(cases(2))]
 
     #[test]
-    fn what_locks_is_proven_to_lock_however_it_lies_and_its_pieces_are_numbered(placed in placed()) {
-        let verdict = placed.judged(&PinnedLid::default(), [Vec3::X, Vec3::X, Vec3::Z], judge_all);
-        prop_assert!(verdict.passed(), "{:?}", verdict.findings);
+    fn what_locks_is_proven_to_lock_however_it_lies_and_its_pieces_are_numbered(placed in places()) {
+        let verdict = placed.judge(&PinnedLid::default(), [Vec3::X, Vec3::X, Vec3::Z], judge_all);
+        prop_assert!(verdict.has_passed(), "{:?}", verdict.findings);
     }
 }
 
@@ -166,8 +166,8 @@ proptest! {
     #[test]
     fn turns_of_the_lattice_permute_the_directions_and_keep_opposites(turn in turns(), d in directions()) {
         let exact = turn.apply(Vec3::from_array(d.step().map(f64::from))).to_array();
-        prop_assert_eq!(turned(&turn, d).step().map(f64::from), exact);
-        prop_assert_eq!(turned(&turn, d.opposite()), turned(&turn, d).opposite());
+        prop_assert_eq!(turn_along(&turn, d).step().map(f64::from), exact);
+        prop_assert_eq!(turn_along(&turn, d.opposite()), turn_along(&turn, d).opposite());
         prop_assert_eq!(d.opposite().opposite(), d);
     }
 
@@ -181,7 +181,7 @@ proptest! {
         prop_assert!(nearest.unit().dot(v) >= dots[25] - 1e-12);
         // In a tie the order decides, which does not turn.
         prop_assume!(dots[25] - dots[24] > 1e-9);
-        prop_assert_eq!(LatticeDirection::nearest(turn.apply(v)), turned(&turn, nearest));
+        prop_assert_eq!(LatticeDirection::nearest(turn.apply(v)), turn_along(&turn, nearest));
         prop_assert_eq!(LatticeDirection::nearest(-v), nearest.opposite());
     }
 

@@ -40,12 +40,12 @@ impl Finished<'_> {
             made.kit.thickness_mm,
             100.0 * self.summary.volume_ratio
         );
-        if verdict.passed() || session.is_verbose {
+        if verdict.has_passed() || session.is_verbose {
             self.print_figures(session);
         }
         print_checks(verdict, session.is_verbose);
         print_warnings(session, self.warnings, standing);
-        if verdict.passed() {
+        if verdict.has_passed() {
             println!("{}", self.printing.words());
             println!(
                 "written to {}: print plates.3mf; report.html shows how it goes together",
@@ -93,7 +93,7 @@ impl Finished<'_> {
 
 /// Lines for `warnings`: the most important ones, each with its place, and the number of those left out.
 fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
-    let ranked = Warning::ranked(warnings);
+    let ranked = Warning::rank(warnings);
     let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
     let n_told = if is_verbose {
         ranked.len()
@@ -148,7 +148,7 @@ pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standi
 
 /// Prints every check if `is_verbose`; else those that failed, or a line that says that all passed.
 fn print_checks(verdict: &Verification, is_verbose: bool) {
-    if verdict.passed() && !is_verbose {
+    if verdict.has_passed() && !is_verbose {
         println!("all {} checks passed", verdict.checks.len());
         return;
     }
@@ -170,12 +170,12 @@ pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
 
 /// Prints each failure with its place on standard error, if there is any.
 pub fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
-    if !verdict.passed() {
+    if !verdict.has_passed() {
         eprintln!(
             "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
         );
         for finding in &verdict.findings {
-            eprintln!("  {}", finding.told(words));
+            eprintln!("  {}", finding.describe(words));
         }
     }
 }

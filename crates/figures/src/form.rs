@@ -67,7 +67,7 @@ impl Sculpture {
 
     /// Adds a form and its mirror image across x = 0.
     pub fn add_pair(&mut self, form: Form, blend: f64) -> &mut Self {
-        let mirrored = form.mirrored();
+        let mirrored = form.mirror();
         self.add(form, blend).add(mirrored, blend)
     }
 
@@ -187,7 +187,7 @@ impl Form {
         }
     }
 
-    fn mirrored(&self) -> Self {
+    fn mirror(&self) -> Self {
         let flip = |p: Vec3| p.with_x(-p.x);
         match *self {
             Self::Ellipsoid {
@@ -363,7 +363,7 @@ mod tests {
             [20.0, 30.0, 40.0],
         );
         for p in [Vec3::new(3.5, 0.0, 1.0), Vec3::new(-1.0, 2.0, 3.0)] {
-            assert!((form.value(p, -99.0) - form.mirrored().value(p.with_x(-p.x), -99.0)).abs() < 1e-12);
+            assert!((form.value(p, -99.0) - form.mirror().value(p.with_x(-p.x), -99.0)).abs() < 1e-12);
         }
     }
 }

@@ -66,7 +66,7 @@ impl Figure {
     }
 
     /// The figure with this [`name`](Self::name); `None` if there is none.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|f| f.name() == name)
     }
 
@@ -150,7 +150,7 @@ mod tests {
                 .map(|f| mesh.face_area(f))
                 .sum();
             assert!(flat_mm2 > 300.0, "{figure:?} stands on {flat_mm2} mm²");
-            assert_eq!(Figure::named(figure.name()), Some(figure));
+            assert_eq!(Figure::from_name(figure.name()), Some(figure));
         }
     }
 

@@ -33,7 +33,7 @@ fn main() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(round);
         let (path, bytes) = &files[rng.random_range(0..files.len())];
-        let bytes = damaged(bytes, &mut rng);
+        let bytes = damage(bytes, &mut rng);
         let extension = Path::new(path).extension().and_then(|e| e.to_str());
         let start = Instant::now();
         let outcome = std::panic::catch_unwind(|| {
@@ -75,14 +75,14 @@ fn keep(what: &str, round: u64, bytes: &[u8]) {
 }
 
 /// Returns the file with a few bytes changed, copied, cut out or cut off.
-fn damaged(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
-    match unpacked(bytes) {
-        Some((name, model)) if rng.random_bool(0.8) => packed(&name, &scratched(&model, rng)),
-        _ => scratched(bytes, rng),
+fn damage(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
+    match unpack(bytes) {
+        Some((name, model)) if rng.random_bool(0.8) => pack(&name, &scratch(&model, rng)),
+        _ => scratch(bytes, rng),
     }
 }
 
-fn scratched(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
+fn scratch(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     /// Words that make numbers and lists invalid.
     const WORDS: [&[u8]; 10] = [
         b"-1",
@@ -124,7 +124,7 @@ fn scratched(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
 }
 
 /// Unpacks the model of a 3MF package.
-fn unpacked(bytes: &[u8]) -> Option<(String, Vec<u8>)> {
+fn unpack(bytes: &[u8]) -> Option<(String, Vec<u8>)> {
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).ok()?;
     let name = "3D/3dmodel.model".to_owned();
     let mut model = Vec::new();
@@ -132,7 +132,7 @@ fn unpacked(bytes: &[u8]) -> Option<(String, Vec<u8>)> {
     Some((name, model))
 }
 
-fn packed(name: &str, model: &[u8]) -> Vec<u8> {
+fn pack(name: &str, model: &[u8]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     archive
         .start_file(name, zip::write::SimpleFileOptions::default())

@@ -26,9 +26,9 @@ pub(super) struct Occurrence<T> {
     /// Index of the part.
     pub(super) part: usize,
     /// Transform from the part to its parent.
-    pub(super) placed: DAffine3,
+    pub(super) transform: DAffine3,
     /// Attribute of the occurrence.
-    pub(super) said: T,
+    pub(super) attribute: T,
 }
 
 /// Lists all occurrences of parts with triangles below `roots`, in file order. `join` combines the attributes
@@ -59,8 +59,8 @@ pub(super) fn occurrences<T: Copy>(
         }
         todo.extend(part.children.iter().rev().map(|child| Occurrence {
             part: child.part,
-            placed: around.placed * child.placed,
-            said: join(around.said, child.said),
+            transform: around.transform * child.transform,
+            attribute: join(around.attribute, child.attribute),
         }));
     }
     Ok(found)
@@ -125,7 +125,7 @@ mod tests {
 
     /// A part whose children are moved along x; the attribute is the displacement.
     fn part(n_triangles: usize, children: &[(usize, f64)]) -> Part<f64> {
-        let children = children.iter().map(|&(c, x)| placed(c, x)).collect();
+        let children = children.iter().map(|&(c, x)| place(c, x)).collect();
         Part {
             id: String::new(),
             n_triangles,
@@ -133,16 +133,16 @@ mod tests {
         }
     }
 
-    fn placed(part: usize, x: f64) -> Occurrence<f64> {
+    fn place(part: usize, x: f64) -> Occurrence<f64> {
         Occurrence {
             part,
-            placed: DAffine3::from_translation(DVec3::X * x),
-            said: x,
+            transform: DAffine3::from_translation(DVec3::X * x),
+            attribute: x,
         }
     }
 
-    fn found(parts: &[Part<f64>], root: usize) -> Result<Vec<Occurrence<f64>>, ReadError> {
-        occurrences(parts, &[placed(root, 0.0)], "object", |around, own| {
+    fn find(parts: &[Part<f64>], root: usize) -> Result<Vec<Occurrence<f64>>, ReadError> {
+        occurrences(parts, &[place(root, 0.0)], "object", |around, own| {
             around + 2.0 * own
         })
     }
@@ -154,10 +154,10 @@ mod tests {
             part(0, &[(0, 1.0), (0, 10.0)]),
             part(1, &[(1, 100.0)]),
         ];
-        let found = found(&parts, 2).unwrap();
+        let found = find(&parts, 2).unwrap();
         let places: Vec<_> = found
             .iter()
-            .map(|o| (o.part, o.placed.translation.x, o.said))
+            .map(|o| (o.part, o.transform.translation.x, o.attribute))
             .collect();
         assert_eq!(places, [(2, 0.0, 0.0), (0, 101.0, 202.0), (0, 110.0, 220.0)]);
     }
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn cycles_and_multiplication_are_refused_without_unrolling_them() {
         let cycle = [part(1, &[(1, 0.0)]), part(0, &[(0, 0.0)])];
-        assert!(matches!(found(&cycle, 0), Err(ReadError::Cycle { .. })));
+        assert!(matches!(find(&cycle, 0), Err(ReadError::Cycle { .. })));
         // Ten times ten times …: 10³⁰ triangles.
         let laughs: Vec<Part<f64>> = (0..31)
             .map(|i| {
@@ -176,6 +176,6 @@ mod tests {
                 }
             })
             .collect();
-        assert!(matches!(found(&laughs, 30), Err(ReadError::TooManyCopies { .. })));
+        assert!(matches!(find(&laughs, 30), Err(ReadError::TooManyCopies { .. })));
     }
 }

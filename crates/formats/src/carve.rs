@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::select::listed;
+use super::select::list_names;
 use super::{Cutter, Loaded, ReadError};
 use shellock_geom::TriMesh;
 use shellock_geom::repair::{CutError, CutFace, cut_out};
@@ -105,7 +105,7 @@ fn refusal(error: &CutError, title: &str, cutters: &[Cutter]) -> ReadError {
         },
         CutError::NothingLeft => ReadError::NothingLeft {
             object: title.to_owned(),
-            cutters: listed(cutters.iter().map(|cutter| &cutter.name)),
+            cutters: list_names(cutters.iter().map(|cutter| &cutter.name)),
         },
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), Re
     for _ in 0..2 {
         if bytes.starts_with(b"\x1F\x8B") {
             let limit = limit(bytes.len());
-            bytes = Cow::Owned(read_bounded(MultiGzDecoder::new(&bytes[..]), limit)?);
+            bytes = Cow::Owned(read_up_to(MultiGzDecoder::new(&bytes[..]), limit)?);
         } else if bytes.starts_with(b"PK\x03\x04") && !is_3mf(&bytes) {
             let (inner, inner_name) = only_mesh(&bytes)?;
             (bytes, name) = (Cow::Owned(inner), Some(inner_name));
@@ -47,12 +47,12 @@ pub(super) fn limit(packed: usize) -> u64 {
 }
 
 /// Reads `source` to its end; an error beyond `limit` bytes.
-pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, ReadError> {
+pub(super) fn read_up_to(source: impl Read, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     source
         .take(limit + 1)
         .read_to_end(&mut bytes)
-        .map_err(|e| unopened(e.into()))?;
+        .map_err(|e| opening_error(e.into()))?;
     if bytes.len() as u64 > limit {
         Err(ReadError::Bomb {
             limit_mb: limit >> 20,
@@ -64,11 +64,11 @@ pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, Rea
 
 /// Opens a zip archive in memory.
 pub(super) fn archive(bytes: &[u8]) -> Result<ZipArchive<Cursor<&[u8]>>, ReadError> {
-    ZipArchive::new(Cursor::new(bytes)).map_err(unopened)
+    ZipArchive::new(Cursor::new(bytes)).map_err(opening_error)
 }
 
 /// Converts an error in opening an archive, or a file in one.
-pub(super) fn unopened(error: ZipError) -> ReadError {
+pub(super) fn opening_error(error: ZipError) -> ReadError {
     // Some errors are reported only on reading the file, wrapped in an I/O error.
     let error = match error {
         ZipError::Io(io) => io.downcast().unwrap_or_else(ZipError::Io),
@@ -121,8 +121,8 @@ fn only_mesh(bytes: &[u8]) -> Result<(Vec<u8>, String), ReadError> {
         .file_names_raw()
         .nth(only)
         .map_or_else(String::new, |n| String::from_utf8_lossy(n).into_owned());
-    let file = archive.by_index(only).map_err(unopened)?;
-    Ok((read_bounded(file, limit(bytes.len()))?, name))
+    let file = archive.by_index(only).map_err(opening_error)?;
+    Ok((read_up_to(file, limit(bytes.len()))?, name))
 }
 
 /// Converts text that looks like UTF-16 to UTF-8; other bytes are unchanged.

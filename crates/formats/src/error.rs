@@ -161,14 +161,14 @@ pub enum ReadError {
         cutters: String,
     },
     /// No object, or no plate, of the name asked for.
-    #[error("{within} has no {what} \"{wanted}\"; it has {has}")]
+    #[error("{within} has no {what} \"{name}\"; it has {has}")]
     NoSuchPart {
         /// Place that was searched: "the file" or "plate 1".
         within: String,
         /// Kind of thing that is missing: "object" or "plate".
         what: &'static str,
         /// Name that was asked for.
-        wanted: String,
+        name: String,
         /// Names that the file has.
         has: String,
     },
@@ -236,7 +236,7 @@ pub enum ReadError {
     },
     /// A count in a header that cannot be true.
     #[error(
-        "{at}: the header promises {promised} {what}, but the file has room for {room} only; it was cut off \
+        "{at}: the header promises {count} {what}, but the file has room for {room} only; it was cut off \
          or its header is wrong: copy or export it again"
     )]
     TooFewBytes {
@@ -245,7 +245,7 @@ pub enum ReadError {
         /// Name of the items counted.
         what: &'static str,
         /// Count given in the header.
-        promised: u64,
+        count: u64,
         /// Largest count for which the bytes suffice.
         room: u64,
     },

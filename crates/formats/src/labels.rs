@@ -38,7 +38,7 @@ fn label(line: &[u8], at: Place) -> Result<Option<i64>, ReadError> {
     };
     let label = whole(Some(first), at, EXPECTED)?;
     if words.next().is_some() {
-        return Err(super::text::malformed(at, EXPECTED, line));
+        return Err(super::text::syntax_error(at, EXPECTED, line));
     }
     if label < 0 {
         Err(ReadError::NegativeLabel { at, label })

@@ -66,7 +66,7 @@ pub struct Loaded {
     pub unit_mm: Option<f64>,
     /// True if the file states the unit itself. Otherwise the unit is the one that the format prescribes,
     /// which many programs ignore.
-    pub unit_is_stated: bool,
+    pub has_unit: bool,
     /// Objects of the file, indexed by the labels of [`LabelSource::Object`]. Empty if the format has no
     /// names, or if an OBJ is not wholly divided into named objects.
     pub objects: Vec<FileObject>,
@@ -245,11 +245,11 @@ impl fmt::Display for Place {
 /// Guarantees: at least one triangle, all points finite, all indices in range, and negative volumes cut out.
 /// Not promised: anything about the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
-    read_selected(bytes, extension, &Selection::default())
+    read_selection(bytes, extension, &Selection::default())
 }
 
 /// Reads the part of a mesh file that `selection` names; otherwise like [`read_mesh`].
-pub fn read_selected(
+pub fn read_selection(
     bytes: &[u8],
     extension: Option<&str>,
     selection: &Selection,

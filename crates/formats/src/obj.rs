@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, coordinate, point, quoted, whole, without_comment, words};
+use super::text::{Lines, coordinate, point, quote, whole, without_comment, words};
 use super::{FileObject, Format, LabelSource, Loaded, Place, ReadError};
 
 /// Statements that divide the faces.
@@ -126,7 +126,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
 /// A note on statements that are not read.
 fn note_of_others(passed_over: &BTreeMap<&[u8], usize>) -> Option<String> {
     let n: usize = passed_over.values().sum();
-    let shown = passed_over.keys().take(QUOTED).map(|word| quoted(word));
+    let shown = passed_over.keys().take(QUOTED).map(|word| quote(word));
     let more = if passed_over.len() > QUOTED { ", …" } else { "" };
     (n > 0).then(|| {
         format!(

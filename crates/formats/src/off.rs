@@ -2,7 +2,7 @@
 
 use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, coordinate, malformed, point, whole, without_bom, without_comment, words};
+use super::text::{Lines, coordinate, point, syntax_error, whole, without_bom, without_comment, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 
 /// Fewest bytes of a point: `0 0 0` and a line end.
@@ -13,7 +13,7 @@ const FACE_BYTES: u64 = 8;
 /// Reads a three-dimensional OFF with one point or face per line; the first word may be missing.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut lines = Lines::of(without_bom(bytes));
-    let Header {
+    let OffHeader {
         n_points,
         n_faces,
         color_at,
@@ -71,7 +71,7 @@ fn color<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f32; 4]> {
 }
 
 /// Contents of the first lines.
-struct Header {
+struct OffHeader {
     n_points: usize,
     n_faces: usize,
     /// Count of numbers between the coordinates of a point and its colour; `None` without colours.
@@ -80,7 +80,7 @@ struct Header {
 
 /// Reads the header. The counts of points and faces are on the line of the first word or on the next; an
 /// error if the bytes do not suffice for them.
-fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
+fn read_header(lines: &mut Lines) -> Result<OffHeader, ReadError> {
     let cut_off = |lines: &Lines| ReadError::CutOff {
         at: lines.place(),
         within: "the header",
@@ -113,14 +113,14 @@ fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
             });
         }
         let promised = u64::try_from(whole(word, at, expected)?)
-            .map_err(|_| malformed(at, expected, word.unwrap_or_default()))?;
+            .map_err(|_| syntax_error(at, expected, word.unwrap_or_default()))?;
         // The last line may lack its end.
         let room = (lines.rest().len() as u64 + 1) / bytes_each;
         if promised > room {
             Err(ReadError::TooFewBytes {
                 at,
                 what,
-                promised,
+                count: promised,
                 room,
             })
         } else {
@@ -129,7 +129,7 @@ fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
     };
     let n_points = count("points", "the number of points", POINT_BYTES)?;
     let n_faces = count("faces", "the number of faces", FACE_BYTES)?;
-    Ok(Header {
+    Ok(OffHeader {
         n_points,
         n_faces,
         color_at,

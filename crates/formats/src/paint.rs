@@ -91,7 +91,7 @@ pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, Re
             }),
         }
     }
-    splitter.conforming()
+    splitter.conform()
 }
 
 struct Leaf {
@@ -187,7 +187,7 @@ impl Splitter {
     }
 
     /// Divides all leaves whose sides contain points of their neighbours.
-    fn conforming(self) -> Result<Painted, ReadError> {
+    fn conform(self) -> Result<Painted, ReadError> {
         let mut painted = Painted {
             mesh: TriMesh {
                 points: self.points,

@@ -113,7 +113,7 @@ fn of_face(colors: &mut [Color]) -> Color {
 #[cfg(test)]
 mod tests {
     use super::super::read_mesh;
-    use super::super::tests::assert_told;
+    use super::super::tests::assert_note;
     use super::*;
 
     const RED: Color = [255, 0, 0, 255];
@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(few.notes, Vec::<String>::new());
         let many = fan(MAX_COLORS + 1);
         assert_eq!(many.labels(LabelSource::Color), None);
-        assert_told(&many, "the points have 65 colours, too many to divide it by");
+        assert_note(&many, "the points have 65 colours, too many to divide it by");
     }
 
     #[test]
@@ -276,7 +276,7 @@ mod tests {
         let loaded = ply("comment TextureFile skin.png", [""; 5], NO_FACE_COLORS);
         assert_eq!(loaded.notes, ["the file's texture is not used"]);
         let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
-        assert_told(&read(obj), "texture");
+        assert_note(&read(obj), "texture");
         for plain in [obj.replace("mtllib", "# mtllib"), obj.replace("/1", "//1")] {
             assert_eq!(read(&plain).notes, Vec::<String>::new());
         }

@@ -54,7 +54,7 @@ impl Polygons {
 
     /// Converts an index counted from 0, which may be that of a later point.
     pub(super) fn corner(&self, index: i64, at: Place) -> Result<u32, ReadError> {
-        u32::try_from(index).map_err(|_| self.missing(index, at))
+        u32::try_from(index).map_err(|_| self.missing_error(index, at))
     }
 
     /// Adds a polygon, as a fan around its first corner until all points are known.
@@ -95,7 +95,7 @@ impl Polygons {
         if let Some((index, at)) = self.highest
             && index as usize >= n_points
         {
-            return Err(self.missing(i64::from(index), at));
+            return Err(self.missing_error(i64::from(index), at));
         }
         let n_folded = self.triangulate();
         let mut labellings: Vec<Labelling> = labels
@@ -114,7 +114,7 @@ impl Polygons {
             file_face,
             format,
             unit_mm: None,
-            unit_is_stated: false,
+            has_unit: false,
             objects: Vec::new(),
             empty_plates: Vec::new(),
             cutters: Vec::new(),
@@ -158,7 +158,7 @@ impl Polygons {
         n_folded
     }
 
-    fn missing(&self, index: i64, at: Place) -> ReadError {
+    fn missing_error(&self, index: i64, at: Place) -> ReadError {
         let index = index.saturating_add(i64::from(self.first));
         ReadError::MissingPoint {
             at,

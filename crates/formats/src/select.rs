@@ -47,7 +47,7 @@ impl fmt::Display for Titles {
             return Ok(());
         }
         let parts = self.parts.iter().map(|part| format!("\"{part}\""));
-        write!(f, " with the parts {}", listed(parts))
+        write!(f, " with the parts {}", list_names(parts))
     }
 }
 
@@ -93,7 +93,7 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
                     |plate| format!("plate {}", plate.trim()),
                 ),
                 what: "object",
-                wanted: wanted.clone(),
+                name: wanted.clone(),
                 has: object_names(&there),
             });
         }
@@ -112,7 +112,7 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
         let named = if names.is_empty() {
             String::new()
         } else {
-            format!(": {}", listed(names))
+            format!(": {}", list_names(names))
         };
         loaded
             .notes
@@ -144,7 +144,7 @@ fn on_plate(loaded: &Loaded, wanted: &str) -> Result<Vec<bool>, ReadError> {
     let has = if names.is_empty() {
         "no plates".to_owned()
     } else {
-        listed(names)
+        list_names(names)
     };
     if loaded.empty_plates.iter().any(fits) {
         return Err(ReadError::EmptyPlate {
@@ -155,7 +155,7 @@ fn on_plate(loaded: &Loaded, wanted: &str) -> Result<Vec<bool>, ReadError> {
     Err(ReadError::NoSuchPart {
         within: "the file".to_owned(),
         what: "plate",
-        wanted: wanted.to_owned(),
+        name: wanted.to_owned(),
         has,
     })
 }
@@ -174,11 +174,11 @@ fn object_names(objects: &[FileObject]) -> String {
     if all.is_empty() {
         return "no objects with names".to_owned();
     }
-    listed(all)
+    list_names(all)
 }
 
 /// Joins the first names of a list, and tells how many more there are.
-pub(super) fn listed<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String {
+pub(super) fn list_names<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String {
     /// Names that a message lists.
     const N_LISTED: usize = 12;
     let names: Vec<T> = names.into_iter().collect();
@@ -247,7 +247,7 @@ impl Loaded {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{read_mesh, read_selected};
+    use super::super::{read_mesh, read_selection};
     use super::*;
 
     const TWO: &[u8] =
@@ -258,7 +258,7 @@ mod tests {
             object: Some(object.to_owned()),
             plate: None,
         };
-        read_selected(bytes, None, &selection)
+        read_selection(bytes, None, &selection)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! STL, binary and ASCII. Stored normals are ignored: the order of the corners defines the outside.
 
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, malformed, point, words};
+use super::text::{Lines, point, syntax_error, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 use shellock_geom::TriMesh;
 
@@ -14,7 +14,7 @@ const HEADER_TEXT: &[u8] = b"binary STL by shellock, millimetres";
 
 /// Returns true if the length is exactly that given by the count in a binary header.
 pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
-    promised(bytes)
+    header_count(bytes)
         .is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
 }
 
@@ -25,7 +25,7 @@ pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
 /// cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
-    let (mut colors, mut notes) = (Colors::default(), Vec::new());
+    let (mut colors, mut notes) = (FaceColors::default(), Vec::new());
     let (mut rest, mut n_files) = (bytes, 0);
     while n_files == 0 || begins_a_file(rest) {
         let base = bytes.len() - rest.len();
@@ -48,10 +48,10 @@ fn add_binary(
     bytes: &[u8],
     base: usize,
     polygons: &mut Polygons,
-    colors: &mut Colors,
+    colors: &mut FaceColors,
     notes: &mut Vec<String>,
 ) -> Result<usize, ReadError> {
-    let Some(promised) = promised(bytes) else {
+    let Some(promised) = header_count(bytes) else {
         return Err(ReadError::CutOff {
             at: Place::Byte(base + bytes.len()),
             within: "the header",
@@ -83,7 +83,7 @@ fn count(body: &[u8], promised: u64, base: usize, notes: &mut Vec<String>) -> Re
         return Err(ReadError::TooFewBytes {
             at: Place::Byte(base + HEADER_BYTES - 4),
             what: "triangles",
-            promised,
+            count: promised,
             room: held as u64,
         });
     }
@@ -94,7 +94,7 @@ fn count(body: &[u8], promised: u64, base: usize, notes: &mut Vec<String>) -> Re
     }
     if !is_unknown && trailing.len() >= TRIANGLE_BYTES && trailing.starts_with(b"solid") {
         let at = Place::Byte(base + HEADER_BYTES + TRIANGLE_BYTES * n_promised);
-        return Err(malformed(
+        return Err(syntax_error(
             at,
             "the end of the file, not a text after the triangles; give each STL as a file of its own",
             trailing,
@@ -123,7 +123,7 @@ fn count(body: &[u8], promised: u64, base: usize, notes: &mut Vec<String>) -> Re
 
 /// True if `bytes` start with a header whose count of triangles fits, and triangles follow.
 fn begins_a_file(bytes: &[u8]) -> bool {
-    let n = promised(bytes)
+    let n = header_count(bytes)
         .and_then(|n| usize::try_from(n).ok())
         .filter(|&n| n > 0);
     let length = n.and_then(|n| n.checked_mul(TRIANGLE_BYTES));
@@ -148,7 +148,7 @@ fn is_like_a_triangle(bytes: &[u8]) -> bool {
 /// Colours in the last two bytes of triangles: 5 bits each of red, green and blue, and a bit that tells if
 /// they are valid.
 #[derive(Default)]
-struct Colors {
+struct FaceColors {
     /// Value of the highest bit in triangles with a colour of their own: set in most programs, not set in
     /// Magics, whose headers contain "COLOR=".
     valid: u16,
@@ -156,7 +156,7 @@ struct Colors {
     labels: Vec<i64>,
 }
 
-impl Colors {
+impl FaceColors {
     /// Starts with the triangles of a file with this header.
     fn begin(&mut self, header: &[u8]) {
         let is_magics = header.windows(6).any(|w| w == b"COLOR=");
@@ -193,8 +193,8 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
             (b"endsolid" | b"color", false) => {}
             // The file ends in the middle of a word.
             (_, true) if lines.rest().is_empty() => break,
-            (_, true) => return Err(malformed(at, "\"vertex\" or \"endfacet\"", first)),
-            (_, false) => return Err(malformed(at, "\"facet\" or \"endsolid\"", first)),
+            (_, true) => return Err(syntax_error(at, "\"vertex\" or \"endfacet\"", first)),
+            (_, false) => return Err(syntax_error(at, "\"facet\" or \"endsolid\"", first)),
         }
     }
     if in_facet {
@@ -248,7 +248,7 @@ pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
 }
 
 /// Number of triangles given in a binary header.
-fn promised(bytes: &[u8]) -> Option<u64> {
+fn header_count(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
     Some(u64::from(u32::from_le_bytes([
         count[0], count[1], count[2], count[3],

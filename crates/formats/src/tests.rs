@@ -52,7 +52,7 @@ fn message(text: impl AsRef<[u8]>) -> String {
 
 /// Asserts that a note of `loaded` contains `words`.
 #[track_caller]
-pub(crate) fn assert_told(loaded: &Loaded, words: &str) {
+pub(crate) fn assert_note(loaded: &Loaded, words: &str) {
     let is_told = loaded.notes.iter().any(|note| note.contains(words));
     assert!(is_told, "{words:?} is not in {:?}", loaded.notes);
 }
@@ -76,7 +76,7 @@ fn every_format_gives_the_tetrahedron_back() {
                 file_face,
                 format,
                 unit_mm: None,
-                unit_is_stated: false,
+                has_unit: false,
                 objects: Vec::new(),
                 empty_plates: Vec::new(),
                 cutters: Vec::new(),
@@ -190,7 +190,7 @@ fn broken_stl_is_refused_with_its_place() {
     let too_few = ReadError::TooFewBytes {
         at: Place::Byte(80),
         what: "triangles",
-        promised: 4,
+        count: 4,
         room: 3,
     };
     assert_eq!(stl(&bytes[..270]), too_few);
@@ -380,7 +380,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     let loaded = read(&ascii).unwrap();
     assert_eq!(loaded, read(&binary).unwrap());
     assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
-    assert_told(&loaded, "1 of 2 faces have a \"label\" below 0");
+    assert_note(&loaded, "1 of 2 faces have a \"label\" below 0");
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
     assert!(matches!(
@@ -402,7 +402,7 @@ fn labels_of_a_float_property_divide_where_they_are_whole() {
     assert_eq!(ply("4.0").face_labels(), Some(&[1, 4][..]));
     let odd = ply("0.5");
     assert_eq!(odd.face_labels(), None);
-    assert_told(&odd, "not all are whole numbers");
+    assert_note(&odd, "not all are whole numbers");
 }
 
 #[test]
@@ -520,14 +520,14 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
             name: "leg <\"1\" & 2>\u{1}",
             color: [255, 0, 16],
             mesh: &mesh,
-            turned: None,
+            rotation: None,
             moved_mm: [0.0; 3],
         },
         NamedObject {
             name: "Kopf ä",
             color: [1, 2, 3],
             mesh: &mesh,
-            turned: Some(quarter),
+            rotation: Some(quarter),
             moved_mm: [10.0, 0.5, -3.0],
         },
     ];

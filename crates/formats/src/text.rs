@@ -69,7 +69,7 @@ pub(super) fn without_comment(line: &[u8]) -> &[u8] {
 }
 
 /// Returns the start of `text`, made printable.
-fn shown(text: &[u8]) -> String {
+fn excerpt(text: &[u8]) -> String {
     String::from_utf8_lossy(&text[..text.len().min(4 * QUOTED_CHARS)])
         .chars()
         .take(QUOTED_CHARS)
@@ -78,13 +78,13 @@ fn shown(text: &[u8]) -> String {
 }
 
 /// Returns the start of a word in quotes, made printable.
-pub(super) fn quoted(word: &[u8]) -> String {
-    format!("\"{}\"", shown(word))
+pub(super) fn quote(word: &[u8]) -> String {
+    format!("\"{}\"", excerpt(word))
 }
 
 /// Creates the error "expected … found …", with `found` shortened and made printable.
-pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
-    let shown = shown(found);
+pub(super) fn syntax_error(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
+    let shown = excerpt(found);
     let ellipsis = if found.len() > shown.len() { "…" } else { "" };
     ReadError::Malformed {
         at,
@@ -108,7 +108,7 @@ pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadErro
         {
             Err(ReadError::NotFinite { at })
         }
-        None => Err(malformed(at, "a number", word)),
+        None => Err(syntax_error(at, "a number", word)),
     }
 }
 
@@ -129,7 +129,7 @@ pub(super) fn whole(word: Option<&[u8]>, at: Place, expected: &'static str) -> R
     let word = word.unwrap_or_default();
     parse::<i64>(word)
         .or_else(|| parse::<f64>(word).and_then(whole_of))
-        .ok_or_else(|| malformed(at, expected, word))
+        .ok_or_else(|| syntax_error(at, expected, word))
 }
 
 /// Converts `value` to an integer, if it is one that a float holds exactly.

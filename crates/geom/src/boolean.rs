@@ -123,25 +123,25 @@ impl Volume {
             .filter(|part| !part.is_empty())
             .map(|part| (part.bounds(), part))
             .collect();
-        Self::united(parts)
+        Self::unite(parts)
     }
 
-    fn united(mut parts: Vec<(Aabb, Self)>) -> Self {
+    fn unite(mut parts: Vec<(Aabb, Self)>) -> Self {
         /// Number of parts up to which they are united in one operation.
         const FEW: usize = 16;
         if parts.len() <= FEW {
-            return Self::united_at_once(parts.into_iter().map(|(_, part)| part).collect());
+            return Self::unite_at_once(parts.into_iter().map(|(_, part)| part).collect());
         }
         let middles = Aabb::around(parts.iter().map(|(around, _)| around.center()));
         let axis = middles.size().to_array();
         let axis = (0..3).fold(0, |most, i| if axis[i] > axis[most] { i } else { most });
         parts.sort_by(|(a, _), (b, _)| a.center()[axis].total_cmp(&b.center()[axis]));
         let rest = parts.split_off(parts.len() / 2);
-        let (a, b) = rayon::join(|| Self::united(parts), || Self::united(rest));
+        let (a, b) = rayon::join(|| Self::unite(parts), || Self::unite(rest));
         a.union(&b)
     }
 
-    fn united_at_once(mut parts: Vec<Self>) -> Self {
+    fn unite_at_once(mut parts: Vec<Self>) -> Self {
         match parts.len() {
             0 => Self::empty(),
             1 => parts.remove(0),
@@ -270,7 +270,7 @@ impl Volume {
         // leaves many fragments. It is needed only if parts share an edge, since half-edges cannot separate
         // these.
         let Some(topology) = Topology::of_mesh(&mesh) else {
-            return self.retain_decomposed(keep);
+            return self.retain_components(keep);
         };
         let (component, n) = components(&topology, |_, _| true);
         let mut points: Vec<Vec<u32>> = vec![Vec::new(); n];
@@ -302,7 +302,7 @@ impl Volume {
         Self::from_closed_mesh(&part).expect("a closed part of a manifold is a manifold")
     }
 
-    fn retain_decomposed(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
+    fn retain_components(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
         let parts = self.0.decompose();
         let n_parts = parts.len();
         let is_kept = |part: &Manifold| {
@@ -353,7 +353,7 @@ impl Volume {
 /// Uses exact arithmetic; the cost grows with the number of crossing pairs of triangles. Fails if the mesh is
 /// open or not oriented.
 pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
-    guarded(mesh, |mesh| {
+    try_rotations(mesh, |mesh| {
         let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
         let refused = |made: &Manifold| NotAVolume {
             reason: format!("{:?}", made.status()),
@@ -376,13 +376,13 @@ pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
 ///
 /// Fails if the library cannot decide.
 pub fn touches_itself(mesh: &TriMesh) -> Result<bool, NotAVolume> {
-    guarded(mesh, |mesh| {
+    try_rotations(mesh, |mesh| {
         Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
     })
     .map(|(touches, _)| touches)
 }
 
-/// Number of threads inside [`guarded`].
+/// Number of threads inside [`try_rotations`].
 static N_GUARDED: AtomicUsize = AtomicUsize::new(0);
 
 /// Returns true if a panic now may come from the library and become an error. A panic hook need not report
@@ -437,7 +437,7 @@ impl Turn {
 ///
 /// The library casts rays in a dozen directions, and panics if every ray meets an edge, as happens for meshes
 /// with integer coordinates. In a rotated mesh the rays take other paths.
-fn guarded<T>(mesh: &TriMesh, work: impl Fn(&TriMesh) -> T) -> Result<(T, Turn), NotAVolume> {
+fn try_rotations<T>(mesh: &TriMesh, work: impl Fn(&TriMesh) -> T) -> Result<(T, Turn), NotAVolume> {
     N_GUARDED.fetch_add(1, Ordering::Relaxed);
     let tried = |turn: Turn| {
         let turned = turn.forth(mesh.clone());

@@ -33,7 +33,7 @@ mod tests;
 mod traverse;
 
 use depth::{Deepest, Passage};
-use pair::{Approach, raised, swept};
+use pair::{Approach, sweep_box, swept};
 use traverse::for_near_pairs;
 
 use crate::bvh::TriangleBvh;
@@ -109,7 +109,7 @@ impl Shape {
 
     /// Restricts [`Scope::WhatCounts`] to the triangles whose index `counts` accepts.
     #[must_use]
-    pub fn counting(mut self, counts: impl Fn(usize) -> bool) -> Self {
+    pub fn count_only(mut self, counts: impl Fn(usize) -> bool) -> Self {
         (0..self.counts.len()).for_each(|f| self.counts[f] = counts(f));
         self
     }
@@ -155,10 +155,15 @@ pub struct Passed {
 
 /// Finds the triangles of `fixed` within `within_mm` of a triangle of `moving` at any travel of `motion`, in
 /// ascending order. The surfaces need not be closed. Distances are exact up to rounding.
-pub fn faces_passed(moving: &TriMesh, fixed: &TriMesh, motion: &Translation, within_mm: f64) -> Vec<Passed> {
+pub fn find_passed_faces(
+    moving: &TriMesh,
+    fixed: &TriMesh,
+    motion: &Translation,
+    within_mm: f64,
+) -> Vec<Passed> {
     let along = motion.along.normalize_or_zero();
     let axes = axes_along(along);
-    let meshes = [moving, fixed].map(|mesh| turned(mesh, axes));
+    let meshes = [moving, fixed].map(|mesh| rotate(mesh, axes));
     let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
     let [a, b] = trees(&meshes, travels, within_mm, |_, _| true);
     let mut by = vec![Aabb::EMPTY; b.faces.len()];
@@ -194,15 +199,15 @@ impl<'a> Encounter<'a> {
     fn new(shapes: [&'a Shape; 2], motion: &Translation, scope: Scope, limit_mm: f64) -> Self {
         let along = motion.along.normalize_or_zero();
         let axes = axes_along(along);
-        let meshes = shapes.map(|shape| turned(shape.solid.mesh(), axes));
+        let meshes = shapes.map(|shape| rotate(shape.solid.mesh(), axes));
         let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
         let in_scope = |which: usize, f: usize| scope == Scope::Everything || shapes[which].counts[f];
         let trees = trees(&meshes, travels, limit_mm, in_scope);
         let [moving, fixed] = shapes;
         Self {
             passage: Passage {
-                moving,
-                fixed,
+                mover: moving,
+                obstacle: fixed,
                 along,
                 travels,
             },
@@ -268,8 +273,8 @@ impl<'a> Encounter<'a> {
     /// Finds the deepest point of either shape in the other.
     fn deepest(&self, touches: bool) -> Deepest {
         let Passage {
-            moving,
-            fixed,
+            mover: moving,
+            obstacle: fixed,
             along,
             travels,
         } = self.passage;
@@ -290,8 +295,8 @@ impl<'a> Encounter<'a> {
         let mut flipped: Vec<(u32, u32)> = crossings.into_iter().map(|(a, b)| (b, a)).collect();
         flipped.sort_unstable();
         let backwards = Passage {
-            moving: fixed,
-            fixed: moving,
+            mover: fixed,
+            obstacle: moving,
             along: -along,
             travels,
         };
@@ -338,7 +343,7 @@ fn axes_along(along: Vec3) -> [Vec3; 3] {
     [x, y, along]
 }
 
-fn turned(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
+fn rotate(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
     let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
     TriMesh {
         points: mesh.points.iter().map(|&p| seen(p)).collect(),
@@ -355,8 +360,8 @@ fn trees(
     counts: impl Fn(usize, usize) -> bool,
 ) -> [Tree; 2] {
     let [a, b] = meshes.each_ref().map(TriMesh::bounds);
-    let room_of_a = raised(b, [-travels[1], -travels[0]]).grown(limit_mm);
-    let room_of_b = raised(a, travels).grown(limit_mm);
+    let room_of_a = sweep_box(b, [-travels[1], -travels[0]]).grown(limit_mm);
+    let room_of_b = sweep_box(a, travels).grown(limit_mm);
     [
         Tree::of(&meshes[0], room_of_a, |f| counts(0, f)),
         Tree::of(&meshes[1], room_of_b, |f| counts(1, f)),

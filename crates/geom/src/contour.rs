@@ -34,7 +34,7 @@ const MAX_STEP_CELLS: f64 = 0.5;
 /// `bounds` must contain the surface; otherwise the solid ends at the grid's border. `field` is called about
 /// `(size / cell_mm)³` times, from several threads. The mesh is empty if no grid point has a positive value.
 pub fn contour(bounds: Aabb, cell_mm: f64, field: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
-    let grid = Grid::sample(bounds, cell_mm, &field);
+    let grid = ScalarGrid::sample(bounds, cell_mm, &field);
     let (points, vertex_of_edge) = grid.crossings();
     let triangles = grid.triangles(&vertex_of_edge);
     let mut mesh = TriMesh { points, triangles };
@@ -47,7 +47,7 @@ pub fn contour(bounds: Aabb, cell_mm: f64, field: impl Fn(Vec3) -> f64 + Sync) -
 }
 
 /// Values at the points of a grid; x runs fastest.
-struct Grid {
+struct ScalarGrid {
     origin: Vec3,
     cell_mm: f64,
     n: [usize; 3],
@@ -57,7 +57,7 @@ struct Grid {
 /// Marks a grid edge that the surface does not cross.
 const NO_VERTEX: u32 = u32::MAX;
 
-impl Grid {
+impl ScalarGrid {
     fn sample(bounds: Aabb, cell_mm: f64, field: &(impl Fn(Vec3) -> f64 + Sync)) -> Self {
         let n = (bounds.size() / cell_mm)
             .to_array()
@@ -306,7 +306,7 @@ mod tests {
                 >> 7;
             (mix & 1023) as f64 - 511.5
         };
-        let grid = Grid::sample(BOX, 0.5, &noise);
+        let grid = ScalarGrid::sample(BOX, 0.5, &noise);
         let (points, vertex_of_edge) = grid.crossings();
         let triangles = grid.triangles(&vertex_of_edge);
         Solid::new(TriMesh { points, triangles }).unwrap();

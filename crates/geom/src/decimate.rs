@@ -209,7 +209,7 @@ impl Decimation {
         let cheapest = self
             .around(v)
             .filter(|&h| self.round[self.ends(h)[1] as usize] < round)
-            .filter_map(|h| self.placed(h, share).map(|(at, cost)| (h, at, cost)))
+            .filter_map(|h| self.place_merge(h, share).map(|(at, cost)| (h, at, cost)))
             .min_by(|a, b| a.2.total_cmp(&b.2));
         if let Some((h, at, _)) = cheapest
             && self.may_collapse(h, at)
@@ -220,7 +220,7 @@ impl Decimation {
 
     /// Position at which the ends of `h` would merge, and the cost of the merge. `None` if the error exceeds
     /// `share` of the squared tolerance.
-    fn placed(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
+    fn place_merge(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
         let [u, v] = self.ends(h).map(|x| x as usize);
         let limit = self.tolerance[u].min(self.tolerance[v]);
         if limit <= 0.0 {

@@ -17,7 +17,7 @@ use crate::topology::Topology;
 use crate::{NotSolid, Solid, TriMesh, Vec3};
 use grid::Grid;
 use rooms::rooms;
-use sides::{Rim, Sides};
+use sides::{CavityRim, Sides};
 
 /// Least share of the cavity in the volume of cavity and solid together, for a body to be hollow. Walls of 5
 /// mm leave 42 % of a cube of 40 mm. The largest fold of the solid figures that were examined has 3 %.
@@ -158,13 +158,13 @@ pub fn fill(solid: &Solid, hollow: &HollowBody) -> Result<Filled, CannotFill> {
 }
 
 /// Area vector of a surface over an opening: area, mm², times the normal out of the cavity.
-fn cap_area(sides: &Sides, rim: &Rim) -> Vec3 {
+fn cap_area(sides: &Sides, rim: &CavityRim) -> Vec3 {
     let part = |[from, to]: [Vec3; 2]| 0.5 * (to - rim.center).cross(from - rim.center);
     rim.edges.iter().map(|&h| part(sides.ends(h))).sum()
 }
 
 /// Volume enclosed by the cavity's triangles and flat caps over its openings, mm³.
-fn cavity(sides: &Sides, rims: &[Rim]) -> f64 {
+fn cavity(sides: &Sides, rims: &[CavityRim]) -> f64 {
     let origin = rims.first().map_or(Vec3::ZERO, |rim| rim.center);
     let volume = |corners: [Vec3; 3]| {
         let [a, b, c] = corners.map(|p| p - origin);

@@ -31,7 +31,7 @@ const NONE: u32 = u32::MAX;
 /// The mesh is closed if `off_band` is [`OffBand::Outside`], or if the level set stays inside the band. Work
 /// and memory are proportional to the band and two layers of its box.
 pub fn contour(band: &Band, field: &[f32], off_band: OffBand) -> TriMesh {
-    contour_cutting(band, field, off_band, Corners::Positive)
+    contour_with_corners(band, field, off_band, Corners::Positive)
 }
 
 /// Corners to separate on an ambiguous face of a cell.
@@ -45,7 +45,7 @@ pub enum Corners {
 }
 
 /// Contours like [`contour`], separating the corners that `apart` names.
-pub fn contour_cutting(band: &Band, field: &[f32], off_band: OffBand, apart: Corners) -> TriMesh {
+pub fn contour_with_corners(band: &Band, field: &[f32], off_band: OffBand, apart: Corners) -> TriMesh {
     let mut out = Contour {
         band,
         off_band,
@@ -365,7 +365,7 @@ mod tests {
             })
             .collect();
         for apart in [Corners::Positive, Corners::Negative] {
-            let mesh = contour_cutting(&band, &noise, OffBand::Outside, apart);
+            let mesh = contour_with_corners(&band, &noise, OffBand::Outside, apart);
             assert!(mesh.triangles.len() > 10_000);
             Solid::new(mesh).unwrap();
         }
@@ -378,7 +378,7 @@ mod tests {
         let field: Vec<f32> = (0..phi.len()).map(noisy).collect();
         let negated: Vec<f32> = field.iter().map(|f| -f).collect();
         let a = contour(&band, &field, OffBand::LikeNeighbours);
-        let b = contour_cutting(&band, &negated, OffBand::LikeNeighbours, Corners::Negative);
+        let b = contour_with_corners(&band, &negated, OffBand::LikeNeighbours, Corners::Negative);
         assert_eq!(a.points.len(), b.points.len());
         assert!(a.points.iter().zip(&b.points).all(|(a, b)| a.distance(*b) < 1e-9));
         assert_eq!(a.triangles.len(), b.triangles.len());

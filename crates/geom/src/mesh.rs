@@ -19,19 +19,19 @@ impl TriMesh {
     }
 
     /// Cross product of two edges of `face`: its normal times twice its area.
-    pub fn area_vector_doubled(&self, face: usize) -> Vec3 {
+    pub fn double_area_vector(&self, face: usize) -> Vec3 {
         let [a, b, c] = self.corners(face);
         (b - a).cross(c - a)
     }
 
     /// Area of triangle `face`, mm².
     pub fn face_area(&self, face: usize) -> f64 {
-        0.5 * self.area_vector_doubled(face).length()
+        0.5 * self.double_area_vector(face).length()
     }
 
     /// Unit normal of `face`; zero for a degenerate triangle.
     pub fn face_normal(&self, face: usize) -> Vec3 {
-        self.area_vector_doubled(face).normalize_or_zero()
+        self.double_area_vector(face).normalize_or_zero()
     }
 
     /// Mean of the three corners of `face`.

@@ -17,7 +17,7 @@ const AREA_SLACK: f64 = 1e-6;
 /// triangles in that plane cover the polygon once: it crosses itself, or is far from flat. Cost: O(n log n).
 pub fn triangulate(corners: &[Vec3]) -> Option<Vec<[u32; 3]>> {
     let n = u32::try_from(corners.len()).ok().filter(|&n| n >= 3)?;
-    let normal = area_vector_doubled(corners).try_normalize()?;
+    let normal = double_area_vector(corners).try_normalize()?;
     let fan: Vec<[u32; 3]> = (1..n - 1).map(|i| [0, i, i + 1]).collect();
     if corners.len() <= LARGEST_FAN && covers_once(corners, &fan, normal) {
         return Some(fan);
@@ -32,11 +32,11 @@ pub fn triangulate(corners: &[Vec3]) -> Option<Vec<[u32; 3]>> {
 
 /// True if the polygon, seen from the direction in which it looks largest, has an area.
 pub fn has_area(corners: &[Vec3]) -> bool {
-    area_vector_doubled(corners).try_normalize().is_some()
+    double_area_vector(corners).try_normalize().is_some()
 }
 
 /// Twice the area of the polygon times its normal (Newell's method).
-fn area_vector_doubled(corners: &[Vec3]) -> Vec3 {
+fn double_area_vector(corners: &[Vec3]) -> Vec3 {
     let [first, rest @ ..] = corners else {
         return Vec3::ZERO;
     };
@@ -48,7 +48,7 @@ fn area_vector_doubled(corners: &[Vec3]) -> Vec3 {
 /// True if `triangles` are as many as the polygon needs and none faces against `normal`, so that each place
 /// of the polygon is covered by one.
 fn covers_once(corners: &[Vec3], triangles: &[[u32; 3]], normal: Vec3) -> bool {
-    let all = area_vector_doubled(corners).dot(normal);
+    let all = double_area_vector(corners).dot(normal);
     let slack = AREA_SLACK * all;
     let doubled = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| corners[i as usize]);

@@ -299,7 +299,7 @@ impl Remesher {
         if name != NO_SEAM {
             let [from, to] = self.surface.span(h, &self.seams);
             let seam = &self.seams[name as usize];
-            let at_mm = seam.wrapped(0.5 * (from + to));
+            let at_mm = seam.wrap(0.5 * (from + to));
             self.surface.split(h, seam.point(at_mm), Place::Seam { at_mm });
             return;
         }
@@ -404,7 +404,7 @@ impl Remesher {
                 continue;
             }
             for share in [1.0, 0.5, 0.25] {
-                let Some((at, place)) = self.relaxed(v, share) else {
+                let Some((at, place)) = self.relax(v, share) else {
                     break;
                 };
                 if self.may_move(v, at, None, |h, t| self.may_face(h, t)) {
@@ -434,7 +434,7 @@ impl Remesher {
 
     /// Position of `v` after this share of the step to the middle of its neighbours; `None` if `v` does not
     /// move.
-    fn relaxed(&self, v: u32, share: f64) -> Option<(Vec3, Place)> {
+    fn relax(&self, v: u32, share: f64) -> Option<(Vec3, Place)> {
         match self.surface.place[v as usize] {
             _ if !self.surface.is_alive(v) => None,
             Place::Corner => None,

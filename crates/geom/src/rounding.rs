@@ -44,7 +44,7 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     if volume.is_empty() {
         return Err(NotPrintable::Empty);
     }
-    let mut mesh = in_canonical_order(&rounded(&volume.to_mesh()));
+    let mut mesh = in_canonical_order(&round_points(&volume.to_mesh()));
     let mut touching = coincident(&mesh);
     for round in 0..MAX_ROUNDS {
         if touching.is_empty() {
@@ -52,7 +52,7 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
         }
         move_apart(&mut mesh, &touching, APART_MM * (1.0 + 0.37 * round as f64));
         let again = Volume::from_closed_mesh(&mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))?;
-        mesh = in_canonical_order(&rounded(&again.simplify(SHORT_MM).to_mesh()));
+        mesh = in_canonical_order(&round_points(&again.simplify(SHORT_MM).to_mesh()));
         touching = coincident(&mesh);
     }
     if let Some(first) = touching.first() {
@@ -87,7 +87,7 @@ pub fn printable_body(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     Ok(mesh)
 }
 
-fn rounded(mesh: &TriMesh) -> TriMesh {
+fn round_points(mesh: &TriMesh) -> TriMesh {
     // Adding 0 turns −0 into 0, so equal points have equal bits.
     let round = |x: f64| f64::from(x as f32) + 0.0;
     TriMesh {
@@ -161,7 +161,7 @@ fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
     let mut joined: HashMap<u32, bool> = HashMap::new();
     for (f, t) in mesh.triangles.iter().enumerate() {
         for &v in t.iter().filter(|v| group_of.contains_key(v)) {
-            *normals.entry(v).or_default() += mesh.area_vector_doubled(f);
+            *normals.entry(v).or_default() += mesh.double_area_vector(f);
             let twin = t.iter().any(|w| *w != v && group_of.get(w) == group_of.get(&v));
             *joined.entry(v).or_default() |= twin;
         }

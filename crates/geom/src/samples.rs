@@ -53,13 +53,13 @@ pub fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
 }
 
 /// Turns the mesh inside out.
-pub fn flipped(mut mesh: TriMesh) -> TriMesh {
+pub fn flip(mut mesh: TriMesh) -> TriMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     mesh
 }
 
 /// Gives each triangle its own points, as in an STL.
-pub fn unwelded(mesh: &TriMesh) -> TriMesh {
+pub fn unweld(mesh: &TriMesh) -> TriMesh {
     TriMesh {
         points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),
         triangles: (0..mesh.triangles.len() as u32)

@@ -45,7 +45,7 @@ struct Facing {
 /// number of threads.
 pub fn slits(solid: &Solid, below_mm: f64) -> Vec<Slit> {
     let mesh = solid.mesh();
-    let facing = facing(mesh, below_mm);
+    let facing = find_facings(mesh, below_mm);
     let mut groups = Groups::of(mesh.triangles.len());
     let mut is_facing = vec![false; mesh.triangles.len()];
     for f in &facing {
@@ -66,14 +66,14 @@ pub fn slits(solid: &Solid, below_mm: f64) -> Vec<Slit> {
     named.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.width_mm.total_cmp(&b.1.width_mm)));
     let mut found: Vec<Slit> = named
         .chunk_by(|a, b| a.0 == b.0)
-        .filter_map(|slit| joined(slit, below_mm))
+        .filter_map(|slit| join(slit, below_mm))
         .collect();
     found.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
     found
 }
 
 /// Combines facing points, sorted by width, into a slit; `None` if they are a crease or a scratch.
-fn joined(points: &[(u32, &Facing)], below_mm: f64) -> Option<Slit> {
+fn join(points: &[(u32, &Facing)], below_mm: f64) -> Option<Slit> {
     let both_mm2: f64 = points.iter().map(|(_, f)| f.area_mm2).sum();
     let area_mm2 = 0.5 * both_mm2;
     let length_mm = Aabb::around(points.iter().map(|(_, f)| f.at)).diagonal();
@@ -93,7 +93,7 @@ fn joined(points: &[(u32, &Facing)], below_mm: f64) -> Option<Slit> {
 }
 
 /// Finds the points that face another part of the surface within `below_mm`.
-fn facing(mesh: &TriMesh, below_mm: f64) -> Vec<Facing> {
+fn find_facings(mesh: &TriMesh, below_mm: f64) -> Vec<Facing> {
     let tree = TriangleBvh::new(mesh);
     let a_point_mm2 = mesh.area() / N_POINTS;
     let start_mm = START_SHARE * below_mm;

@@ -195,12 +195,12 @@ impl SparseSymmetric {
         let kept = first_kept as u32..n as u32;
         let order: Vec<u32> = order.iter().copied().chain(kept.clone()).collect();
         let place: Vec<u32> = place.iter().copied().chain(kept).collect();
-        let factor = Cholesky::ordered(
+        let factor = Cholesky::factorise(
             &self,
             SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, n)),
         )?;
 
-        let l = factor.trailing(first_kept)?;
+        let l = factor.trailing_block(first_kept)?;
         let mut schur = Mat::<f64>::zeros(n_kept, n_kept);
         let (lower, upper) = (BlockStructure::TriangularLower, BlockStructure::TriangularUpper);
         triangular::matmul(
@@ -293,7 +293,7 @@ const PANEL: usize = 192;
 ///
 /// # Panics
 /// Panics if `values` does not have `n²` entries, or if `n_eliminated` exceeds `n`.
-pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
+pub fn eliminate_first(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
     let matrix = MatMut::from_column_major_slice_mut(values, n, n);
     let (mut pivot, _, mut below, rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
     let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(
@@ -369,7 +369,7 @@ impl Cholesky {
         Self::in_order(&EliminationOrder::new(matrix)?, matrix)
     }
 
-    fn ordered(matrix: &SparseSymmetric, order: SymmetricOrdering<'_, u32>) -> Result<Self, SparseError> {
+    fn factorise(matrix: &SparseSymmetric, order: SymmetricOrdering<'_, u32>) -> Result<Self, SparseError> {
         Self::in_order(
             &EliminationOrder(Arc::new(symbolic(matrix.pattern(), order)?)),
             matrix,
@@ -399,7 +399,7 @@ impl Cholesky {
     }
 
     /// Rows and columns of the factor from `first` on, in the order of elimination.
-    fn trailing(&self, first: usize) -> Result<Mat<f64>, SparseError> {
+    fn trailing_block(&self, first: usize) -> Result<Mat<f64>, SparseError> {
         let n = self.symbolic.nrows();
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError::TooLarge { n });
@@ -506,7 +506,7 @@ mod tests {
     #[test]
     fn dense_and_sparse_elimination_agree() {
         let (_, mut dense) = chain();
-        eliminate_leading(&mut dense, 12, 10).unwrap();
+        eliminate_first(&mut dense, 12, 10).unwrap();
         for (at, want) in [
             (10 + 120, 2.0 / 11.0),
             (11 + 120, -2.0 / 11.0),

@@ -131,7 +131,7 @@ mod tests {
         // The result fills a polygon of nine corners.
         assert_eq!(triangles.len(), 7);
         let mesh = TriMesh { points, triangles };
-        assert!((0..7).all(|face| mesh.area_vector_doubled(face).z > 0.0));
+        assert!((0..7).all(|face| mesh.double_area_vector(face).z > 0.0));
         assert!((mesh.area() - 72.0).abs() < 1e-12);
     }
 }

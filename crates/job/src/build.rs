@@ -72,7 +72,7 @@ pub struct Made {
 impl Made {
     /// Returns true if every check passes.
     pub fn passed(&self) -> bool {
-        self.design.kit.verification.passed()
+        self.design.kit.verification.has_passed()
     }
 }
 

@@ -103,7 +103,7 @@ fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
         .map_err(|e: toml::de::Error| fault(e.message().to_owned()))?;
     let process = own.process.as_deref().map(|p| {
         let names = || Process::ALL.map(|(name, _)| name).join(", ");
-        Process::named(p)
+        Process::from_name(p)
             .ok_or_else(|| fault(format!("there is no process \"{p}\"; choose one of {}", names())))
     });
     let process = process.transpose()?;

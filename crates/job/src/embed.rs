@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use shellock::Progress;
 use shellock::{Ctx, Warning};
-use shellock_formats::{read_selected, write_ply};
+use shellock_formats::{read_selection, write_ply};
 use shellock_geom::TriMesh;
 use shellock_geom::weld::weld;
 
@@ -141,7 +141,7 @@ pub fn design(
             .iter()
             .map(|(_, mesh)| mesh.clone())
             .collect(),
-        warnings: Warning::ranked(&made.warnings),
+        warnings: Warning::rank(&made.warnings),
         notes: made.notes,
         files: made.files,
     })
@@ -246,11 +246,12 @@ fn model(request: &Request<'_>) -> Result<Model, Problem> {
         Source::File(bytes) => Cow::Borrowed(bytes),
     };
     let extension = path.extension().and_then(|e| e.to_str());
-    let loaded =
-        read_selected(&bytes, extension, &input::selection(options)).map_err(|source| Failure::NotAMesh {
+    let loaded = read_selection(&bytes, extension, &input::selection(options)).map_err(|source| {
+        Failure::NotAMesh {
             path: path.to_owned(),
             source,
-        })?;
+        }
+    })?;
     Ok(input::model_of(path, &loaded, &bytes, options)?)
 }
 

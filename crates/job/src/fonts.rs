@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use fontdb::{Database, FaceInfo, Style, Weight};
 use shellock::Warning;
-use shellock_print::fonts::{ExtraFont, covered, lacking};
+use shellock_print::fonts::{ExtraFont, available_characters, missing_characters};
 
 use crate::causes::Cause;
 use crate::input::Model;
@@ -17,12 +17,12 @@ pub fn of_name(model: &Model, options: &Options) -> Vec<ExtraFont> {
     if options.no_booklet {
         return Vec::new();
     }
-    of_system(lacking(&model.name, &[]))
+    of_system(missing_characters(&model.name, &[]))
 }
 
 /// Warns of letters of the model's name that no font has.
 pub fn warning(model: &Model, options: &Options) -> Option<Warning> {
-    let letters: String = lacking(&model.name, &of_name(model, options))
+    let letters: String = missing_characters(&model.name, &of_name(model, options))
         .into_iter()
         .collect();
     let is_printed = !options.no_booklet;
@@ -41,7 +41,7 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
     let mut faces: Vec<&FaceInfo> = database.faces().filter(|face| !is_stand_in(face)).collect();
     faces.sort_by_cached_key(|face| preference(face));
     let read = |face: &&FaceInfo| {
-        let found = |bytes: &[u8], index| covered(bytes, index, &characters);
+        let found = |bytes: &[u8], index| available_characters(bytes, index, &characters);
         database.with_face_data(face.id, found).unwrap_or_default()
     };
     let has: Vec<BTreeSet<char>> = faces.iter().map(read).collect();

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use shellock::Warning;
-use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selected};
+use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selection};
 use shellock_geom::repair::{InsideOut, Repair, RepairMode, Repaired, repair_as};
 use shellock_geom::simplify::simplify;
 use shellock_geom::{Solid, Vec3};
@@ -89,7 +89,7 @@ pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
 pub fn load_selected(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
     let extension = path.extension().and_then(|e| e.to_str());
-    let loaded = read_selected(&bytes, extension, selection).map_err(|source| Failure::NotAMesh {
+    let loaded = read_selection(&bytes, extension, selection).map_err(|source| Failure::NotAMesh {
         path: path.to_owned(),
         source,
     })?;
@@ -347,7 +347,7 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
     /// Cells along the longest side: polygons of about 1/95 of the size, smooth to the eye, some 55 000
     /// triangles.
     const CELLS: f64 = 94.0;
-    let figure = shellock::figure::Figure::named(name).ok_or_else(|| {
+    let figure = shellock::figure::Figure::from_name(name).ok_or_else(|| {
         let all: Vec<&str> = shellock::figure::Figure::ALL.iter().map(|f| f.name()).collect();
         Failure::Wrong(no_such("figure", name, &all))
     })?;

@@ -344,7 +344,7 @@ fn assembly(design: &Design) -> Vec<u8> {
             name,
             color: palette::color(p.into()),
             mesh,
-            turned: None,
+            rotation: None,
             moved_mm: [0.0; 3],
         })
         .collect();

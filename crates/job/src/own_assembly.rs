@@ -172,7 +172,7 @@ impl Judgement {
     /// Judgement that a verification comes to.
     pub fn of(found: Verification) -> Self {
         Self {
-            passed: found.passed(),
+            passed: found.has_passed(),
             checks: found.checks,
             findings: found.findings,
         }

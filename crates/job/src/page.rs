@@ -52,7 +52,7 @@ pub fn report(
     let facts = kit_facts(&shown, settings, design, summary, &standing);
     let quantities = quantities(design);
     let looks = looks(&pieces);
-    let has_passed = design.kit.verification.passed();
+    let has_passed = design.kit.verification.has_passed();
     // A kit that failed is not to be printed.
     let tabs = if has_passed {
         let made = design.kit.pieces.as_slice();
@@ -205,7 +205,7 @@ fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Bor
 fn failure(finding: &Finding, standing: &Standing) -> Warning {
     Warning::new(
         Cause::Failed {
-            finding: finding.told(standing),
+            finding: finding.describe(standing),
         },
         Vec::new(),
         finding.place(),

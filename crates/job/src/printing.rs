@@ -42,7 +42,7 @@ impl Printing {
         let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
         let plates = lay(printer, &printables);
         let mut loads = vec![Load::default(); plates.n_plates];
-        for laid in &plates.laid {
+        for laid in &plates.poses {
             loads[laid.plate] = loads[laid.plate].and(laid.load);
         }
         let whole = lay_alone(printer, solid.mesh()).map(|laid| {
@@ -88,7 +88,7 @@ impl Printing {
     /// Describes the plates in one line for people.
     pub fn words(&self) -> String {
         let n = self.plates.n_plates;
-        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let outer_mm2: f64 = self.plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let supports = match self.printer.process {
             Process::Sls => String::new(),
             _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
@@ -132,7 +132,7 @@ impl Printing {
     /// Lists the figures of the plates for the page.
     pub fn figures(&self) -> Vec<(String, String)> {
         let n = self.plates.n_plates;
-        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let outer_mm2: f64 = self.plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let mut figures = vec![
             ("printer".to_owned(), described(&self.printer)),
             ("plates".to_owned(), n.to_string()),
@@ -162,7 +162,7 @@ impl Printing {
         let [width, depth, _] = self.printer.bed_mm;
         let laid: Vec<(usize, TriMesh)> = self
             .plates
-            .laid
+            .poses
             .iter()
             .filter(|l| l.plate == plate)
             .map(|l| (l.piece, as_laid(l, &pieces[l.piece])))
@@ -205,13 +205,13 @@ impl Printing {
                 name,
                 color: palette::color(laid.piece),
                 mesh,
-                turned: Some(laid.turned),
+                rotation: Some(laid.axes),
                 moved_mm,
             }
         };
         let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {
             self.plates
-                .laid
+                .poses
                 .iter()
                 .filter(|l| l.plate == plate)
                 .map(|l| object(l, l.moved_mm))
@@ -219,7 +219,7 @@ impl Printing {
         };
         let all = || {
             self.plates
-                .laid
+                .poses
                 .iter()
                 .map(|l| object(l, l.moved_among_plates_mm(&self.printer)))
                 .collect()

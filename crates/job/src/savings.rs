@@ -229,7 +229,7 @@ impl Slicer {
             name: "solid",
             color: [200; 3],
             mesh: solid.mesh(),
-            turned: Some(laid.turned),
+            rotation: Some(laid.axes),
             moved_mm: laid.moved_mm,
         };
         let is_single = files.len() == 1;

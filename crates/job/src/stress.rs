@@ -210,7 +210,7 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
     let mut plan_params = Settings::resolve(&params).plan;
     let mut turn = Turn::default();
     if let Some(key) = &plan.key {
-        let (laid, along) = Turn::laying(Vec3::from(key.plane_normal), Vec3::from(key.slide));
+        let (laid, along) = Turn::align(Vec3::from(key.plane_normal), Vec3::from(key.slide));
         plan_params.key = plan.key_piece;
         (turn, plan_params.key_slide) = (laid, Some(along));
     }

@@ -29,7 +29,7 @@ fn cases(mesh: &TriMesh) -> Vec<LoadCase> {
             .map(|(v, _)| v);
         LoadCase {
             forces_n: mesh.points.iter().map(force).collect(),
-            held: held.collect(),
+            anchors: held.collect(),
             ..LoadCase::default()
         }
     };

@@ -51,10 +51,10 @@ fn main() -> Any<()> {
         .iter()
         .map(|&v| Support {
             point: v as u32,
-            held: [true; 6],
+            is_held: [true; 6],
         })
         .collect();
-    let solver = shell.at_thickness_held(wall_mm, &supports)?;
+    let solver = shell.at_thickness_with(wall_mm, &supports)?;
     let case = LoadCase {
         forces_n,
         ..LoadCase::default()
@@ -67,7 +67,7 @@ fn main() -> Any<()> {
 
     let solver = shell.at_thickness(wall_mm)?;
     let in_the_mean = LoadCase {
-        held: held.iter().map(|&v| v as u32).collect(),
+        anchors: held.iter().map(|&v| v as u32).collect(),
         ..case.clone()
     };
     let in_the_mean_mpa = von_mises(&solver, &solver.solve(&[in_the_mean])?[0]);

@@ -44,7 +44,7 @@ fn main() -> Any<()> {
     for cell_mm in numbers(cells)? {
         solve(&case, cell_mm, &mut touches, &mut runs)?;
     }
-    let json = told(&case, &touches)?;
+    let json = describe(&case, &touches)?;
     writeln!(std::io::stdout(), "{json}\"runs\": [{}]}}", runs.join(","))?;
     Ok(())
 }
@@ -116,7 +116,7 @@ fn solve(case: &Case, cell_mm: f64, touches: &mut Vec<Touch>, runs: &mut Vec<Str
 }
 
 /// Start of the JSON text: the case itself.
-fn told(case: &Case, touches: &[Touch]) -> Any<String> {
+fn describe(case: &Case, touches: &[Touch]) -> Any<String> {
     let Case {
         files, hold, pushes, ..
     } = case;
@@ -204,7 +204,7 @@ fn middles(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Vec3, f64)) {
     let [a, b, c] = mesh.corners(face);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / SAMPLE_MM).ceil().max(1.0) as usize;
-    let area_mm2 = mesh.area_vector_doubled(face).length() / 2.0 / (n * n) as f64;
+    let area_mm2 = mesh.double_area_vector(face).length() / 2.0 / (n * n) as f64;
     let at = |i: f64, j: f64| a + (b - a) * (i / n as f64) + (c - a) * (j / n as f64);
     for i in 0..n {
         for j in 0..n - i {

@@ -140,7 +140,7 @@ pub struct Opening {
 
 impl Opening {
     /// Rates the openings `opening_mm` at the stations.
-    pub fn rated(meetings: &[Meeting], opening_mm: Vec<f64>) -> Self {
+    pub fn rate(meetings: &[Meeting], opening_mm: Vec<f64>) -> Self {
         let rated = meetings
             .iter()
             .zip(&opening_mm)
@@ -206,12 +206,12 @@ mod tests {
                 joint: weight.map(joint),
             }
         };
-        let rated = Opening::rated(
+        let rated = Opening::rate(
             &[Some(1.0), Some(0.1), None, Some(0.5)].map(meeting),
             vec![2.0, 9.0, 50.0, 5.0],
         );
         assert_eq!((rated.quality_mm, rated.worst), (-2.5, Some(3)));
-        let none = Opening::rated(&[meeting(None)], vec![1.0]);
+        let none = Opening::rate(&[meeting(None)], vec![1.0]);
         assert_eq!((none.quality_mm, none.worst), (0.0, None));
     }
 }

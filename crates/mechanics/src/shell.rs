@@ -4,7 +4,7 @@
 //! ```text
 //!   ShellModel::new(mesh, material)      elements and pattern, once a mesh:   K = H·K_m + H³·K_b
 //!         .at_thickness(H)               one factorisation:                   each case holds its own nodes,
-//!         .at_thickness_held(H, supports)                                     or these supports hold all
+//!         .at_thickness_with(H, supports)                                     or these supports hold all
 //!             .solve(cases)              two triangular solves a case
 //!             .stresses(displacements)   both faces of every triangle
 //! ```
@@ -176,7 +176,7 @@ impl ShellModel {
             .collect();
 
         let pattern = SparseSymmetric::of_cells(n_nodes, DOFS, &mesh.triangles);
-        let [membrane, bending] = assembled(&pattern, &mesh.triangles, &elements);
+        let [membrane, bending] = assemble(&pattern, &mesh.triangles, &elements);
         let mut areas_mm2 = vec![0.0; n_nodes];
         for (t, corners) in mesh.triangles.iter().enumerate() {
             corners
@@ -220,17 +220,17 @@ impl ShellModel {
     }
 
     /// Like [`at_thickness`](Self::at_thickness), but `supports` hold the shell in all load cases.
-    pub fn at_thickness_held(
+    pub fn at_thickness_with(
         &self,
         thickness_mm: f64,
         supports: &[Support],
     ) -> Result<ShellSolver<'_>, ShellError> {
-        ShellSolver::held(self, thickness_mm, supports)
+        ShellSolver::with_supports(self, thickness_mm, supports)
     }
 }
 
 /// Assembles the membrane and bending stiffnesses of all elements at the entries of `pattern`.
-fn assembled(
+fn assemble(
     pattern: &SparseSymmetric,
     triangles: &[[u32; 3]],
     elements: &[(Element, [Stiffness; 2])],
@@ -287,7 +287,7 @@ fn check(mesh: &TriMesh, material: &Material) -> Result<(), ShellError> {
             .length_squared()
             .max((c - b).length_squared())
             .max((a - c).length_squared());
-        let has_area = mesh.area_vector_doubled(t).length() > MIN_HEIGHT * longest_sq;
+        let has_area = mesh.double_area_vector(t).length() > MIN_HEIGHT * longest_sq;
         if !has_area {
             return Err(ShellError::FlatTriangle(t as u32));
         }

@@ -201,9 +201,9 @@ pub struct SolidModel {
 /// Displacements of the pieces under a load.
 pub struct Moved<'a> {
     model: &'a SolidModel,
-    displaced: Vec<Vec<f64>>,
+    displacements: Vec<Vec<f64>>,
     frames: Vec<[f64; 6]>,
-    settled: Vec<Vec<f64>>,
+    settlements: Vec<Vec<f64>>,
     settled_frames: Vec<[f64; 6]>,
     /// Difference between the friction bounds used and those of the contact pressures, as a share of the
     /// load.
@@ -253,10 +253,10 @@ impl SolidModel {
             .par_iter()
             .map(|body| stress::probes(body, &elements, is_connector))
             .collect();
-        Self::joined(params, elements, bodies, touches, held, probes)
+        Self::assemble(params, elements, bodies, touches, held, probes)
     }
 
-    fn joined(
+    fn assemble(
         params: &SolidParams,
         elements: Elements,
         bodies: Vec<Body>,
@@ -364,15 +364,16 @@ impl SolidModel {
             });
         }
         let rest = State::rest(&little);
-        let (settled, _) = self.answered(&contacts, &little, &rest.clone(), rest, friction, is_stopped)?;
+        let (settled, _) =
+            self.find_equilibrium(&contacts, &little, &rest.clone(), rest, friction, is_stopped)?;
         let start = settled.under(&loads, &self.compliance);
         let (state, friction_off) =
-            self.answered(&contacts, &loads, &settled, start, friction, is_stopped)?;
+            self.find_equilibrium(&contacts, &loads, &settled, start, friction, is_stopped)?;
         let n_bearing = state.force.iter().filter(|f| **f != Vec3::ZERO).count();
         Ok(Moved {
-            displaced: self.displaced(&sides, 1.0, &state.force),
+            displacements: self.displacements(&sides, 1.0, &state.force),
             frames: state.frames,
-            settled: self.displaced(&sides, SETTLING_SHARE, &settled.force),
+            settlements: self.displacements(&sides, SETTLING_SHARE, &settled.force),
             settled_frames: settled.frames,
             friction_off,
             n_bearing,
@@ -382,7 +383,7 @@ impl SolidModel {
 
     /// Computes the equilibrium with friction that counts slip from `origin`. Also returns the deviation of
     /// the friction bounds from the pressures.
-    fn answered(
+    fn find_equilibrium(
         &mut self,
         contacts: &[Contact],
         loads: &Loads,
@@ -460,7 +461,7 @@ impl SolidModel {
 
     /// Scales the forces by `share` and projects them onto contacts and frames.
     fn loads(&self, pushes: &[Push], sides: &[Vec<f64>], share: f64) -> Loads {
-        let free = self.displaced(sides, share, &vec![Vec3::ZERO; self.contacts.len()]);
+        let free = self.displacements(sides, share, &vec![Vec3::ZERO; self.contacts.len()]);
         let size_n = share * pushes.iter().map(|p| p.force_n.length()).sum::<f64>().max(1e-9);
         let on_frames = (0..sides.len()).map(|part| self.on_frame(part, &sides[part]).map(|f| share * f));
         Loads {
@@ -490,7 +491,7 @@ impl SolidModel {
     }
 
     /// Displacements of each piece relative to its frame, under a share of the loads and the contact forces.
-    fn displaced(&self, sides: &[Vec<f64>], share: f64, force_n: &[Vec3]) -> Vec<Vec<f64>> {
+    fn displacements(&self, sides: &[Vec<f64>], share: f64, force_n: &[Vec3]) -> Vec<Vec<f64>> {
         let on_seats = self.compliance.on_seats(force_n);
         (0..sides.len())
             .into_par_iter()
@@ -512,19 +513,19 @@ impl SolidModel {
 impl Moved<'_> {
     /// Displacement of a place, mm.
     pub fn moved_mm(&self, spot: &Spot) -> Vec3 {
-        self.at(spot, &self.displaced, &self.frames)
+        self.at(spot, &self.displacements, &self.frames)
     }
 
     /// Displacement of a place when the play had been taken up, mm.
     pub fn settled_mm(&self, spot: &Spot) -> Vec3 {
-        self.at(spot, &self.settled, &self.settled_frames)
+        self.at(spot, &self.settlements, &self.settled_frames)
     }
 
-    fn at(&self, spot: &Spot, displaced: &[Vec<f64>], frames: &[[f64; 6]]) -> Vec3 {
+    fn at(&self, spot: &Spot, displacements: &[Vec<f64>], frames: &[[f64; 6]]) -> Vec3 {
         let body = &self.model.compliance.bodies[spot.part];
         let motions = body.frame.motions(spot.at);
         let by_frame: Vec3 = (0..6).map(|k| frames[spot.part][k] * motions[k]).sum();
-        by_frame + body.moved(&displaced[spot.part], &spot.place)
+        by_frame + body.displacement(&displacements[spot.part], &spot.place)
     }
 
     /// Pieces (from 0) that nothing stops, ascending.
@@ -540,14 +541,14 @@ impl Moved<'_> {
     /// Stress level of the walls and of the connectors.
     pub fn stress(&self) -> [StressLevel; 2] {
         let model = self.model;
-        let found: Vec<_> = (0..self.displaced.len())
+        let found: Vec<_> = (0..self.displacements.len())
             .into_par_iter()
             .map(|part| {
                 stress::samples(
                     &model.compliance.bodies[part],
                     &model.elements,
                     &model.probes[part],
-                    &self.displaced[part],
+                    &self.displacements[part],
                 )
             })
             .collect();

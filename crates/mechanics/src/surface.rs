@@ -93,7 +93,7 @@ impl SurfaceParams {
     /// cantilever.
     fn contact_n_mm(&self, size_mm: f64, length_mm: f64) -> f64 {
         let (thickness, depth) = (PIN_WIDTH * size_mm, PIN_DEPTH * size_mm);
-        3.0 * self.stiffness_ratios[2] * terms::bending(self, thickness) * length_mm / depth.powi(3)
+        3.0 * self.stiffness_ratios[2] * terms::bending_stiffness(self, thickness) * length_mm / depth.powi(3)
     }
 }
 

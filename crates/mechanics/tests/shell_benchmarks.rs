@@ -40,9 +40,9 @@ fn grid(cells: [usize; 2], place: impl Fn(f64, f64) -> Vec3) -> TriMesh {
 /// Holds the degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) at the points selected
 /// by `at`.
 fn hold(mesh: &TriMesh, dofs: &str, at: impl Fn(Vec3) -> bool) -> Vec<Support> {
-    let held = ['x', 'y', 'z', 'X', 'Y', 'Z'].map(|dof| dofs.contains(dof));
+    let is_held = ['x', 'y', 'z', 'X', 'Y', 'Z'].map(|dof| dofs.contains(dof));
     let points = (0..).zip(&mesh.points).filter(|(_, p)| at(**p));
-    points.map(|(point, _)| Support { point, held }).collect()
+    points.map(|(point, _)| Support { point, is_held }).collect()
 }
 
 fn is_zero(x: f64) -> bool {
@@ -66,7 +66,7 @@ fn solve(
     forces_n: Vec<Vec3>,
 ) -> Vec<Vec3> {
     let model = ShellModel::new(mesh, &m).unwrap();
-    let solver = model.at_thickness_held(thickness, supports).unwrap();
+    let solver = model.at_thickness_with(thickness, supports).unwrap();
     let case = LoadCase {
         forces_n,
         ..LoadCase::default()
@@ -186,7 +186,7 @@ fn clamped_plate(n: usize) -> [f64; 2] {
         .iter()
         .map(|a| Vec3::Z * (PRESSURE * a))
         .collect();
-    let solver = model.at_thickness_held(1.0, &supports).unwrap();
+    let solver = model.at_thickness_with(1.0, &supports).unwrap();
     let u = solver
         .solve(&[LoadCase {
             forces_n,

@@ -110,7 +110,7 @@ fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Fla
         }
     }
     best.1.map_or(Flatness::NONE, |plane| {
-        let plane = plane.refined(spots);
+        let plane = plane.refine(spots);
         Flatness {
             normal: plane.normal,
             share: plane.area_mm2(spots) / total,

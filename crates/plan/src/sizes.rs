@@ -416,7 +416,7 @@ impl Cavity {
     fn size_that_fits_mm(&self, params: &SizeParams, seams: &[Seam]) -> f64 {
         let mut fits: Vec<f64> = seams
             .iter()
-            .flat_map(|seam| seam.resampled((seam.length() / STEP_MM).ceil().max(1.0) as usize))
+            .flat_map(|seam| seam.resample((seam.length() / STEP_MM).ceil().max(1.0) as usize))
             .filter_map(|(point, normal)| {
                 let inwards = -normal.try_normalize()?;
                 let (_, on_mm) = self

@@ -72,7 +72,7 @@ impl PlanSurvey {
 fn mean_normals(surface: &SegmentedSurface, area_mm2: &IdVec<PatchId, f64>) -> IdVec<PatchId, Vec3> {
     let mut sums = vec![Vec3::ZERO; surface.n_patches];
     for (face, &patch) in surface.patch_of_face.iter().enumerate() {
-        sums[usize::from(patch)] += 0.5 * surface.mesh.area_vector_doubled(face);
+        sums[usize::from(patch)] += 0.5 * surface.mesh.double_area_vector(face);
     }
     sums.into_iter()
         .zip(area_mm2.as_slice())

@@ -14,10 +14,10 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
-use crate::fonts::{ExtraFont, Fonts, isolated};
+use crate::fonts::{ExtraFont, Fonts, isolate};
 pub use crate::pdf::{Color, Paper};
 use crate::pdf::{PAGE_MM, Page, Style, document};
-use bears::wrapped;
+use bears::wrap;
 pub use bears::{Borne, WeakPlace};
 use texts::text_pages;
 use view::{Sight, side, sights};
@@ -56,8 +56,8 @@ pub struct Booklet<'a> {
     pub after: Vec<Section>,
     /// Paper that the booklet is printed on.
     pub paper: Paper,
-    /// Fonts for characters that the program's fonts lack ([`lacking`](crate::fonts::lacking)), the preferred
-    /// first.
+    /// Fonts for characters that the program's fonts lack
+    /// ([`missing_characters`](crate::fonts::missing_characters)), the preferred first.
     pub fonts: Vec<ExtraFont>,
 }
 
@@ -81,7 +81,7 @@ pub struct Step {
     /// Instruction, such as the side from which the piece is inserted.
     pub heading: String,
     /// Words for the viewpoint, and true if it differs from the previous step's.
-    pub seen: (String, bool),
+    pub viewpoint: (String, bool),
 }
 
 /// Best viewing direction for the installation of each of `pieces`, in their order: unit vectors from the
@@ -111,9 +111,9 @@ struct Facing {
 
 impl Drawn<'_> {
     /// Returns the faces turned towards a viewer who looks along `direction`.
-    fn facing(&self, direction: Vec3) -> Facing {
+    fn visible_faces(&self, direction: Vec3) -> Facing {
         let mesh = self.piece.mesh;
-        let seen = (0..mesh.triangles.len()).filter(|&f| mesh.area_vector_doubled(f).dot(direction) < 0.0);
+        let seen = (0..mesh.triangles.len()).filter(|&f| mesh.double_area_vector(f).dot(direction) < 0.0);
         let (triangles, normals) = seen.map(|f| (mesh.triangles[f], self.normals[f])).unzip();
         Facing {
             mesh: TriMesh {
@@ -126,7 +126,7 @@ impl Drawn<'_> {
 }
 
 impl Facing {
-    fn painted(&self, color: Color, shift: Vec3) -> Painted<'_> {
+    fn paint(&self, color: Color, shift: Vec3) -> Painted<'_> {
         Painted {
             mesh: &self.mesh,
             color,
@@ -140,10 +140,13 @@ impl Facing {
 /// Renders all pieces in their colours from the front, each moved by its entry in `shifts`.
 fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2]) -> Image {
     let camera = Camera::front();
-    let facing: Vec<Facing> = drawn.par_iter().map(|d| d.facing(camera.direction)).collect();
+    let facing: Vec<Facing> = drawn
+        .par_iter()
+        .map(|d| d.visible_faces(camera.direction))
+        .collect();
     let all = facing.iter().zip(drawn).zip(shifts);
     let scene: Vec<Painted<'_>> = all
-        .map(|((f, d), &shift)| f.painted(d.piece.color, shift))
+        .map(|((f, d), &shift)| f.paint(d.piece.color, shift))
         .collect();
     render(&scene, &camera, width, height)
 }
@@ -163,7 +166,7 @@ impl Booklet<'_> {
     }
 
     fn pages<'f>(&self, fonts: &'f Fonts<'f>) -> Vec<Page<'f>> {
-        let drawn = self.drawn();
+        let drawn = self.list_drawings();
         let mut pages = vec![self.cover(&drawn, fonts)];
         pages.extend(text_pages("Before you begin", &self.before, fonts));
         pages.extend(pieces_pages(&drawn, fonts));
@@ -171,7 +174,7 @@ impl Booklet<'_> {
         pages.extend(text_pages("Afterwards", &self.after, fonts));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
-            let foot = format!("{}  –  {} of {n_pages}", isolated(&self.title), i + 1);
+            let foot = format!("{}  –  {} of {n_pages}", isolate(&self.title), i + 1);
             let style = small(FAINT);
             let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
             let left = PAGE_MM[0] - RIM_MM - page.width_mm(style, &foot).min(room_mm);
@@ -182,7 +185,7 @@ impl Booklet<'_> {
 
     /// Draws the steps alone, in order of installation, for output other than PDF.
     pub fn steps(&self) -> Vec<Step> {
-        let drawn = self.drawn();
+        let drawn = self.list_drawings();
         let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
         let sights = sights(&pieces);
         let step = |i: usize| {
@@ -197,14 +200,14 @@ impl Booklet<'_> {
                 arrow: arrow.into_iter().map(in_pixels).collect(),
                 piece: (piece.color, piece.number),
                 heading: what_to_do(piece, i),
-                seen: seen_from(&sights, i),
+                viewpoint: seen_from(&sights, i),
             }
         };
         (0..drawn.len()).into_par_iter().map(step).collect()
     }
 
     /// Returns the pieces in order of installation, with their normals.
-    fn drawn(&self) -> Vec<Drawn<'_>> {
+    fn list_drawings(&self) -> Vec<Drawn<'_>> {
         let drawn = |piece| Drawn {
             piece,
             normals: crease_normals(piece.mesh),
@@ -275,7 +278,7 @@ fn pieces_pages<'f>(drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> 
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
-        let mut page = headed(
+        let mut page = start_page(
             "Pieces",
             "each carries its number on its inner side; they go in by number",
             fonts,
@@ -283,7 +286,7 @@ fn pieces_pages<'f>(drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> 
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);
-            numbered(
+            draw_number(
                 &mut page,
                 [x + 5.0, y + 6.0],
                 4.6,
@@ -386,9 +389,9 @@ fn room_beside(sight: &Sight, [width, height]: [usize; 2]) -> [usize; 2] {
 /// Renders the pieces installed up to step `i`, the new one in its place, seen along `direction`.
 fn in_place(drawn: &[Drawn<'_>], i: usize, direction: Vec3, size: [usize; 2]) -> Image {
     let camera = Camera::along(direction, Vec3::Z);
-    let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.facing(direction)).collect();
-    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.painted(GREY, Vec3::ZERO)).collect();
-    scene[i] = facing[i].painted(drawn[i].piece.color, Vec3::ZERO);
+    let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.visible_faces(direction)).collect();
+    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.paint(GREY, Vec3::ZERO)).collect();
+    scene[i] = facing[i].paint(drawn[i].piece.color, Vec3::ZERO);
     render(&scene, &camera, size[0], size[1])
 }
 
@@ -400,7 +403,7 @@ fn other_view(page: &mut Page<'_>, [x, y]: [f64; 2], sight: &Sight, picture: Ima
     page.picture([x + 2.0 + width - OTHER_MM, top], OTHER_MM, picture);
     let room_mm = width - OTHER_MM - 4.0;
     let words = format!("its place, seen from {}", view::side(-direction));
-    for (k, line) in wrapped(page.fonts(), &words, small(FAINT), room_mm)
+    for (k, line) in wrap(page.fonts(), &words, small(FAINT), room_mm)
         .iter()
         .enumerate()
     {
@@ -415,7 +418,7 @@ fn other_view(page: &mut Page<'_>, [x, y]: [f64; 2], sight: &Sight, picture: Ima
 
 fn step_heading(page: &mut Page<'_>, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {
     let left = x + 1.0;
-    numbered(
+    draw_number(
         page,
         [left + 5.0, y + 7.2],
         5.0,
@@ -477,9 +480,12 @@ fn step_picture(
     let new = &drawn[i];
     let back = -sight.travel_mm * Vec3::from(new.piece.installation_direction);
     let camera = sight.camera();
-    let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.facing(camera.direction)).collect();
-    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.painted(GREY, Vec3::ZERO)).collect();
-    scene[i] = facing[i].painted(new.piece.color, if i > 0 { back } else { Vec3::ZERO });
+    let facing: Vec<Facing> = drawn[..=i]
+        .iter()
+        .map(|d| d.visible_faces(camera.direction))
+        .collect();
+    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.paint(GREY, Vec3::ZERO)).collect();
+    scene[i] = facing[i].paint(new.piece.color, if i > 0 { back } else { Vec3::ZERO });
     let image = render(&scene, &camera, size[0], size[1]);
     let home = new.piece.mesh.bounds().center();
     let place = projection(&scene, &camera, size[0], size[1]);
@@ -520,7 +526,7 @@ fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
 }
 
 /// Draws a number on a disc in the colour of a piece.
-fn numbered(page: &mut Page<'_>, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
+fn draw_number(page: &mut Page<'_>, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
     page.disc(middle, radius_mm, color);
     let is_dark = color.iter().map(|&c| u32::from(c)).sum::<u32>() < 400;
     page.text_amid(
@@ -530,7 +536,7 @@ fn numbered(page: &mut Page<'_>, middle: [f64; 2], radius_mm: f64, color: Color,
     );
 }
 
-fn headed<'f>(title: &str, note: &str, fonts: &'f Fonts<'f>) -> Page<'f> {
+fn start_page<'f>(title: &str, note: &str, fonts: &'f Fonts<'f>) -> Page<'f> {
     let mut page = Page::new(fonts);
     page.text([RIM_MM, RIM_MM + 6.0], bold(7.0, INK), title);
     if !note.is_empty() {

@@ -107,7 +107,7 @@ impl Columns {
     }
 
     /// Columns that intersect the piece, in order.
-    pub fn shaded(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn shadow(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.len()).filter(|&column| !self.spans(column).is_empty())
     }
 

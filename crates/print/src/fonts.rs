@@ -21,7 +21,7 @@ use unicode_bidi::{BidiInfo, Level};
 pub struct ExtraFont {
     bytes: Arc<Vec<u8>>,
     index: u32,
-    embedded: Font,
+    font: Font,
 }
 
 impl ExtraFont {
@@ -34,7 +34,7 @@ impl ExtraFont {
         Some(Self {
             bytes,
             index,
-            embedded,
+            font: embedded,
         })
     }
 }
@@ -46,7 +46,7 @@ impl std::fmt::Debug for ExtraFont {
 }
 
 /// Returns those of `characters` that a font file has, none if the bytes are no font.
-pub fn covered(bytes: &[u8], index: u32, characters: &BTreeSet<char>) -> BTreeSet<char> {
+pub fn available_characters(bytes: &[u8], index: u32, characters: &BTreeSet<char>) -> BTreeSet<char> {
     let Some(face) = Face::from_slice(bytes, index) else {
         return BTreeSet::new();
     };
@@ -55,8 +55,8 @@ pub fn covered(bytes: &[u8], index: u32, characters: &BTreeSet<char>) -> BTreeSe
 }
 
 /// Returns the characters of a text that neither the program's fonts nor `extra` have.
-pub fn lacking(text: &str, extra: &[ExtraFont]) -> BTreeSet<char> {
-    Fonts::new(extra).lacking(text)
+pub fn missing_characters(text: &str, extra: &[ExtraFont]) -> BTreeSet<char> {
+    Fonts::new(extra).missing_characters(text)
 }
 
 /// Bytes of the two fonts that are part of the program.
@@ -78,7 +78,7 @@ pub(crate) struct Fonts<'a> {
 /// A font as text is shaped with it, and as a file holds it.
 struct Typeface<'a> {
     face: Face<'a>,
-    embedded: Font,
+    font: Font,
 }
 
 impl Typeface<'_> {
@@ -108,12 +108,12 @@ impl<'a> Fonts<'a> {
         let own = own().into_iter().filter_map(|bytes| {
             let face = Face::from_slice(bytes, 0)?;
             let embedded = Font::new(Data::from(bytes), 0)?;
-            Some(Typeface { face, embedded })
+            Some(Typeface { face, font: embedded })
         });
         let extra = extra.iter().filter_map(|font| {
             let face = Face::from_slice(&font.bytes, font.index)?;
-            let embedded = font.embedded.clone();
-            Some(Typeface { face, embedded })
+            let embedded = font.font.clone();
+            Some(Typeface { face, font: embedded })
         });
         Self {
             faces: own.chain(extra).collect(),
@@ -121,8 +121,8 @@ impl<'a> Fonts<'a> {
     }
 
     /// Font as a file holds it.
-    pub fn embedded(&self, font: FontId) -> Font {
-        self.faces[font].embedded.clone()
+    pub fn font(&self, font: FontId) -> Font {
+        self.faces[font].font.clone()
     }
 
     /// Shapes a line of text; runs from left to right.
@@ -141,7 +141,7 @@ impl<'a> Fonts<'a> {
                 }
                 let shaped = parts
                     .into_iter()
-                    .map(|(font, part)| self.shaped(font, part, is_rtl));
+                    .map(|(font, part)| self.shape(font, part, is_rtl));
                 runs.extend(shaped);
             }
         }
@@ -169,7 +169,7 @@ impl<'a> Fonts<'a> {
     }
 
     /// Characters of a text that no font has.
-    fn lacking(&self, text: &str) -> BTreeSet<char> {
+    fn missing_characters(&self, text: &str) -> BTreeSet<char> {
         let lacks = |c: &char| !is_invisible(*c) && !self.faces.iter().any(|face| face.has(*c));
         printable(text).chars().filter(lacks).collect()
     }
@@ -209,7 +209,7 @@ impl<'a> Fonts<'a> {
             .unwrap_or(own)
     }
 
-    fn shaped(&self, font: FontId, text: &str, is_rtl: bool) -> Run {
+    fn shape(&self, font: FontId, text: &str, is_rtl: bool) -> Run {
         let face = &self.faces[font].face;
         let mut buffer = UnicodeBuffer::new();
         buffer.push_str(text);
@@ -258,7 +258,7 @@ pub(crate) fn printable(text: &str) -> String {
 }
 
 /// Name amid other words, so that the directions of its letters do not turn the words around it.
-pub(crate) fn isolated(name: &str) -> String {
+pub(crate) fn isolate(name: &str) -> String {
     format!("\u{2068}{name}\u{2069}")
 }
 
@@ -305,8 +305,11 @@ mod tests {
     #[test]
     fn a_font_that_is_lent_is_used_for_what_is_lacking_alone() {
         let text = format!("key {RECORDER} 7");
-        assert_eq!(lacking(&text, &[]), [RECORDER].into());
-        assert!(lacking(&text, &[extra()]).is_empty() && lacking("Größe, γάτα, Ёжик, עכבר", &[]).is_empty());
+        assert_eq!(missing_characters(&text, &[]), [RECORDER].into());
+        assert!(
+            missing_characters(&text, &[extra()]).is_empty()
+                && missing_characters("Größe, γάτα, Ёжик, עכבר", &[]).is_empty()
+        );
         let lent = [extra()];
         let runs = Fonts::new(&lent).line(&text, true);
         let fonts: Vec<(FontId, &str)> = runs.iter().map(|run| (run.font, run.text.as_str())).collect();
@@ -324,8 +327,11 @@ mod tests {
         assert!(ExtraFont::new(b"no font at all".to_vec(), 0).is_none());
         assert!(ExtraFont::new(dejavu::sans_mono::regular()[..2000].to_vec(), 0).is_none());
         assert!(ExtraFont::new(dejavu::sans_mono::regular().to_vec(), 1).is_none());
-        assert!(covered(b"no font", 0, &['a'].into()).is_empty());
-        assert_eq!(covered(own()[0], 0, &['a', '兔'].into()), ['a'].into());
+        assert!(available_characters(b"no font", 0, &['a'].into()).is_empty());
+        assert_eq!(
+            available_characters(own()[0], 0, &['a', '兔'].into()),
+            ['a'].into()
+        );
     }
 
     #[test]
@@ -338,7 +344,7 @@ mod tests {
         assert_eq!(starts, [2, 0], "the last letter stands leftmost");
         // What follows a name that is isolated stays behind it, even numbers.
         for name in ["\u{5E2}\u{5DB}", "\u{202E}ab"] {
-            let runs = fonts.line(&format!("{} 2 of 9", isolated(name)), false);
+            let runs = fonts.line(&format!("{} 2 of 9", isolate(name)), false);
             assert_eq!(
                 runs.last().map(|run| run.text.as_str()),
                 Some(" 2 of 9"),

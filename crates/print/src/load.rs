@@ -95,7 +95,7 @@ impl Load {
         if printer.process == Process::Sls {
             return load;
         }
-        load.shadow_mm2 = columns.shaded().count() as f64 * columns.cell_mm2();
+        load.shadow_mm2 = columns.shadow().count() as f64 * columns.cell_mm2();
         let supports = Supports::of(columns, printer.layer_mm);
         load.support_mm3 = supports.volume_mm3(columns);
         if printer.process == Process::Sla {
@@ -103,7 +103,7 @@ impl Load {
             return load;
         }
         load.top_mm2 = (0..mesh.triangles.len())
-            .map(|face| mesh.area_vector_doubled(face).dot(up).max(0.0) / 2.0)
+            .map(|face| mesh.double_area_vector(face).dot(up).max(0.0) / 2.0)
             .sum();
         let solid_mm = SOLID_LAYERS * printer.layer_mm;
         Filament::of(columns).add_slices(columns, &supports, solid_mm, &mut load);
@@ -127,7 +127,7 @@ fn slices(columns: &Columns) -> (impl Iterator<Item = f64>, f64) {
 pub(crate) struct Supports {
     starts: Vec<u32>,
     /// Lower and upper ends, mm.
-    filled: Vec<[f64; 2]>,
+    spans: Vec<[f64; 2]>,
 }
 
 impl Supports {
@@ -135,10 +135,10 @@ impl Supports {
         let least_normal = -OVERHANG_MM / OVERHANG_MM.hypot(layer_mm);
         let mut supports = Self {
             starts: Vec::with_capacity(columns.len() + 1),
-            filled: Vec::new(),
+            spans: Vec::new(),
         };
         for column in 0..columns.len() {
-            supports.starts.push(supports.filled.len() as u32);
+            supports.starts.push(supports.spans.len() as u32);
             let mut below_mm = 0.0;
             for span in columns.spans(column) {
                 let Span {
@@ -147,21 +147,21 @@ impl Supports {
                     bottom_normal,
                 } = *span;
                 if bottom_normal < least_normal && bottom_mm - below_mm > CONTACT_MM + layer_mm {
-                    supports.filled.push([below_mm, bottom_mm - CONTACT_MM]);
+                    supports.spans.push([below_mm, bottom_mm - CONTACT_MM]);
                 }
                 below_mm = top_mm;
             }
         }
-        supports.starts.push(supports.filled.len() as u32);
+        supports.starts.push(supports.spans.len() as u32);
         supports
     }
 
     fn volume_mm3(&self, columns: &Columns) -> f64 {
-        self.filled.iter().map(|[lo, hi]| hi - lo).sum::<f64>() * columns.cell_mm2()
+        self.spans.iter().map(|[lo, hi]| hi - lo).sum::<f64>() * columns.cell_mm2()
     }
 
     pub fn of_column(&self, column: usize) -> &[[f64; 2]] {
-        &self.filled[self.starts[column] as usize..self.starts[column + 1] as usize]
+        &self.spans[self.starts[column] as usize..self.starts[column + 1] as usize]
     }
 }
 
@@ -169,7 +169,7 @@ impl Supports {
 struct Slice {
     width: usize,
     /// Columns that are not empty, and their cells.
-    shaded: Vec<(usize, usize)>,
+    cells: Vec<(usize, usize)>,
     /// True for each cell inside the piece.
     inside: Vec<bool>,
     islands: Islands,
@@ -182,7 +182,7 @@ impl Slice {
         let cell = |column: usize| (column / n_along + 1) * width + column % n_along + 1;
         Self {
             width,
-            shaded: columns.shaded().map(|column| (column, cell(column))).collect(),
+            cells: columns.shadow().map(|column| (column, cell(column))).collect(),
             inside: vec![false; width * (n_across + 2)],
             islands: Islands::default(),
         }
@@ -207,21 +207,24 @@ impl Slice {
 struct Resin {
     slice: Slice,
     /// True for cells outside the piece that air reaches from below.
-    vented: Vec<bool>,
+    is_vented: Vec<bool>,
 }
 
 impl Resin {
     fn of(columns: &Columns) -> Self {
         let slice = Slice::of(columns);
         let vented = vec![true; slice.inside.len()];
-        Self { slice, vented }
+        Self {
+            slice,
+            is_vented: vented,
+        }
     }
 
     fn add_slices(mut self, columns: &Columns, load: &mut Load) {
         let (heights, step_mm) = slices(columns);
         for z_mm in heights {
             let mut n_inside = 0;
-            for &(column, cell) in &self.slice.shaded {
+            for &(column, cell) in &self.slice.cells {
                 let is_inside = columns.spans(column).iter().any(|s| s.holds(z_mm));
                 self.slice.inside[cell] = is_inside;
                 n_inside += usize::from(is_inside);
@@ -241,14 +244,14 @@ impl Resin {
             is_open[*rim as usize] = true;
         }
         for (cell, label) in label.iter().enumerate() {
-            if !inside[cell] && self.vented[cell] {
+            if !inside[cell] && self.is_vented[cell] {
                 is_open[*label as usize] = true;
             }
         }
         let mut n_closed = 0;
         for (cell, label) in label.iter().enumerate() {
-            self.vented[cell] = !inside[cell] && is_open[*label as usize];
-            n_closed += usize::from(!inside[cell] && !self.vented[cell]);
+            self.is_vented[cell] = !inside[cell] && is_open[*label as usize];
+            n_closed += usize::from(!inside[cell] && !self.is_vented[cell]);
         }
         n_closed
     }
@@ -277,7 +280,7 @@ impl Filament {
     fn add_slices(mut self, columns: &Columns, supports: &Supports, solid_mm: f64, load: &mut Load) {
         let (heights, step_mm) = slices(columns);
         for z_mm in heights {
-            for &(column, cell) in &self.slice.shaded {
+            for &(column, cell) in &self.slice.cells {
                 let span = columns.spans(column).iter().find(|s| s.holds(z_mm));
                 self.slice.inside[cell] = span.is_some();
                 self.deep[cell] =
@@ -294,7 +297,7 @@ impl Filament {
         let (width, inside) = (self.slice.width, &self.slice.inside);
         let wide = &mut self.wide[0];
         wide.fill(false);
-        for &(column, cell) in &self.slice.shaded {
+        for &(column, cell) in &self.slice.cells {
             if supports
                 .of_column(column)
                 .iter()
@@ -313,7 +316,7 @@ impl Filament {
         let width = slice.width;
         // Perimeters are about a cell wide, so a cell with a neighbour outside has no infill.
         let mut sparse = slice.none();
-        for &(_, cell) in &slice.shaded {
+        for &(_, cell) in &slice.cells {
             let around = slice.neighbours(cell);
             sparse[cell] = slice.inside[cell] && self.deep[cell] && around.iter().all(|&n| slice.inside[n]);
         }
@@ -340,7 +343,7 @@ fn short_outlines(slice: &mut Slice, cell_mm: f64) -> usize {
     let of_island = std::mem::take(&mut slice.islands.label);
     slice.find_lakes();
     let mut edges: Vec<(u32, u32)> = Vec::new();
-    for &(_, cell) in slice.shaded.iter().filter(|(_, cell)| slice.inside[*cell]) {
+    for &(_, cell) in slice.cells.iter().filter(|(_, cell)| slice.inside[*cell]) {
         let outside = slice.neighbours(cell).into_iter().filter(|&n| !slice.inside[n]);
         edges.extend(outside.map(|n| (of_island[cell], slice.islands.label[n])));
     }

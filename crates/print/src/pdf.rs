@@ -127,7 +127,7 @@ impl<'f> Page<'f> {
 
     /// Draws text as [`Self::text`] does, smaller or shortened if it would be wider than `room_mm`.
     pub fn text_within(&mut self, at: [f64; 2], room_mm: f64, style: Style, text: &str) {
-        let (style, text) = fitted(self.fonts, style, text, room_mm);
+        let (style, text) = fit(self.fonts, style, text, room_mm);
         self.text(at, style, &text);
     }
 
@@ -181,7 +181,7 @@ pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Optio
         let settings = PageSettings::from_wh(width, height).unwrap_or_default();
         let mut written = document.start_page_with(settings);
         let mut surface = written.surface();
-        surface.push_transform(&placed(size_mm));
+        surface.push_transform(&fit_to_paper(size_mm));
         for mark in page.marks {
             draw(&mut surface, mark, page.fonts);
         }
@@ -191,7 +191,7 @@ pub(crate) fn document(title: &str, pages: Vec<Page<'_>>, paper: Paper) -> Optio
 }
 
 /// Transform that centres a page on paper of another size and scales it to fit.
-fn placed(size_mm: [f64; 2]) -> Transform {
+fn fit_to_paper(size_mm: [f64; 2]) -> Transform {
     let scale = (size_mm[0] / PAGE_MM[0]).min(size_mm[1] / PAGE_MM[1]);
     let [x, y] = [0, 1].map(|k| points(0.5 * (size_mm[k] - scale * PAGE_MM[k])));
     Transform::from_row(scale as f32, 0.0, 0.0, scale as f32, x, y)
@@ -208,7 +208,7 @@ fn draw(surface: &mut Surface<'_>, mark: Mark, fonts: &Fonts<'_>) {
         Mark::Picture([x, y], [width, height], picture) => {
             let place = Transform::from_translate(points(x), points(y));
             let size = Size::from_wh(points(width), points(height));
-            let (Some(size), Ok(picture)) = (size, embedded(&picture)) else {
+            let (Some(size), Ok(picture)) = (size, embed(&picture)) else {
                 return;
             };
             surface.push_transform(&place);
@@ -221,9 +221,9 @@ fn draw(surface: &mut Surface<'_>, mark: Mark, fonts: &Fonts<'_>) {
                 width: points(rim_mm),
                 ..Stroke::default()
             };
-            surface.set_fill(Some(filled(color)));
+            surface.set_fill(Some(fill(color)));
             surface.set_stroke((rim_mm > 0.0).then_some(outline));
-            if let Some(path) = closed(&corners) {
+            if let Some(path) = close_path(&corners) {
                 surface.draw_path(&path);
             }
         }
@@ -231,12 +231,12 @@ fn draw(surface: &mut Surface<'_>, mark: Mark, fonts: &Fonts<'_>) {
 }
 
 fn draw_text(surface: &mut Surface<'_>, [x, y]: [f64; 2], style: Style, runs: &[Run], fonts: &Fonts<'_>) {
-    surface.set_fill(Some(filled(style.color)));
+    surface.set_fill(Some(fill(style.color)));
     surface.set_stroke(None);
     let mut left = x;
     for run in runs {
         let at = Point::from_xy(points(left), points(y));
-        let (font, size) = (fonts.embedded(run.font), points(style.size_mm));
+        let (font, size) = (fonts.font(run.font), points(style.size_mm));
         surface.draw_glyphs(at, &run.glyphs, font, &run.text, size, false);
         left += run.width() * style.size_mm;
     }
@@ -246,7 +246,7 @@ fn paint([r, g, b]: Color) -> rgb::Color {
     rgb::Color::new(r, g, b)
 }
 
-fn filled(color: Color) -> Fill {
+fn fill(color: Color) -> Fill {
     Fill {
         paint: paint(color).into(),
         ..Fill::default()
@@ -254,7 +254,7 @@ fn filled(color: Color) -> Fill {
 }
 
 /// Closed path through `corners`; `None` if it is empty or one of them is no number.
-fn closed(corners: &[[f64; 2]]) -> Option<Path> {
+fn close_path(corners: &[[f64; 2]]) -> Option<Path> {
     let mut path = PathBuilder::new();
     for (i, corner) in corners.iter().enumerate() {
         let [x, y] = corner.map(points);
@@ -297,7 +297,7 @@ impl CustomImage for Pixels {
 }
 
 /// Picture as the file holds it, on white. It is compressed on another thread.
-fn embedded(picture: &Image) -> Result<krilla::image::Image, String> {
+fn embed(picture: &Image) -> Result<krilla::image::Image, String> {
     let opaque = picture.clone().on([255; 3]);
     let rgb = opaque
         .rgba
@@ -309,7 +309,7 @@ fn embedded(picture: &Image) -> Result<krilla::image::Image, String> {
 }
 
 /// Fits text into a width of `room_mm`: scales it down to no less than 0.6 of its size, then shortens it.
-fn fitted(fonts: &Fonts<'_>, style: Style, text: &str, room_mm: f64) -> (Style, String) {
+fn fit(fonts: &Fonts<'_>, style: Style, text: &str, room_mm: f64) -> (Style, String) {
     const SMALLEST: f64 = 0.6;
     let shrunk = room_mm / width_mm(fonts, style, text).max(f64::MIN_POSITIVE);
     let style = Style {

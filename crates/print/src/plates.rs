@@ -38,7 +38,7 @@ pub struct Laid {
     /// Index of the plate, from 0.
     pub plate: usize,
     /// Images of the x, y and z axes: the columns of the rotation.
-    pub turned: [[f64; 3]; 3],
+    pub axes: [[f64; 3]; 3],
     /// Translation after the rotation, mm. The lowest point comes to z = 0, and the origin is the corner of
     /// the plate.
     pub moved_mm: [f64; 3],
@@ -55,7 +55,7 @@ pub struct Laid {
 impl Laid {
     /// Maps a point of the assembled piece to its position on the plate, mm.
     pub fn place(&self, p: Vec3) -> Vec3 {
-        let [x, y, z] = self.turned.map(Vec3::from_array);
+        let [x, y, z] = self.axes.map(Vec3::from_array);
         p.x * x + p.y * y + p.z * z + Vec3::from_array(self.moved_mm)
     }
 
@@ -70,7 +70,7 @@ impl Laid {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plates {
     /// Poses in order of pieces, without those that are too large.
-    pub laid: Vec<Laid>,
+    pub poses: Vec<Laid>,
     /// Number of plates in use.
     pub n_plates: usize,
     /// Indices of the pieces that are too large for the printer.
@@ -96,7 +96,7 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let by = |measure: fn(&Pose) -> f64| {
         let mut order: Vec<usize> = (0..fitting.len()).collect();
         order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
-        improved(printer, &fitting, order)
+        improve(printer, &fitting, order)
     };
     let (high, large) = (by(|pose| pose.bounds.size().z), by(Pose::footprint_mm2));
     let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) {
@@ -105,14 +105,14 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
         large
     };
     let n_plates = fitting_spots.n_plates();
-    let mut laid: Vec<Laid> = fitting_spots
+    let mut poses: Vec<Laid> = fitting_spots
         .0
         .iter()
-        .map(|(at, spot)| placed(fitting[*at].0, &fitting[*at].1, spot))
+        .map(|(at, spot)| place(fitting[*at].0, &fitting[*at].1, spot))
         .collect();
-    laid.sort_by_key(|l| l.piece);
+    poses.sort_by_key(|l| l.piece);
     Plates {
-        laid,
+        poses,
         n_plates,
         too_large,
     }
@@ -140,17 +140,17 @@ impl Packing {
 }
 
 /// Improves an order by swaps of two pieces. Returns the packing of the best order found.
-fn improved(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -> Packing {
+fn improve(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -> Packing {
     /// Largest number of orders tried: all swaps of 15 pieces twenty times, 0.1 s.
     const MOST_TRIES: usize = 2000;
-    let mut best = packed(printer, poses, &order);
+    let mut best = pack_in_order(printer, poses, &order);
     let mut cost = best.cost(poses);
     let (mut n_tries, mut is_better) = (0, true);
     while is_better {
         is_better = false;
         for (i, j) in (0..order.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
             order.swap(i, j);
-            let other = packed(printer, poses, &order);
+            let other = pack_in_order(printer, poses, &order);
             let other_cost = other.cost(poses);
             if other_cost < cost {
                 (best, cost, is_better) = (other, other_cost, true);
@@ -166,7 +166,7 @@ fn improved(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -
     best
 }
 
-fn packed(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packing {
+fn pack_in_order(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packing {
     let sides: Vec<[f64; 2]> = order
         .iter()
         .map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM))
@@ -209,7 +209,7 @@ pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
         is_outer: vec![true; mesh.triangles.len()],
     };
     let pose = orient::best(printer, &piece, [f64::INFINITY; 3])?;
-    Some(placed(
+    Some(place(
         0,
         &pose,
         &Spot {
@@ -226,19 +226,19 @@ fn room_mm(printer: &Printer) -> [f64; 3] {
     [width - 2.0 * EDGE_MM, depth - 2.0 * EDGE_MM, height]
 }
 
-fn placed(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
+fn place(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
     let pose = if spot.is_turned {
-        pose.quarter_turned()
+        pose.quarter_turn()
     } else {
         pose.clone()
     };
     let corner = Vec3::new(spot.corner_mm[0] + EDGE_MM, spot.corner_mm[1] + EDGE_MM, 0.0);
     // Images of the axes: the columns of the rotation.
-    let turned = [0, 1, 2].map(|axis| pose.axes.map(|row| row[axis]));
+    let axes = [0, 1, 2].map(|axis| pose.axes.map(|row| row[axis]));
     Laid {
         piece,
         plate: spot.plate,
-        turned,
+        axes,
         moved_mm: (corner - pose.bounds.min).to_array(),
         size_mm: pose.bounds.size().to_array(),
         outer_support_mm2: pose.support.outer_mm2,

@@ -19,7 +19,7 @@ impl Process {
     pub const ALL: [(&'static str, Self); 3] = [("sla", Self::Sla), ("fdm", Self::Fdm), ("sls", Self::Sls)];
 
     /// Returns the process called `name`, in upper or lower case.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL
             .iter()
             .find(|(n, _)| n.eq_ignore_ascii_case(name))

@@ -17,7 +17,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_report::Warning;
 
 pub use loads::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
-pub use page::{escaped, html};
+pub use page::{escape, html};
 pub use pictures::{from_inside, pieces_picture};
 
 /// Contents of the report page, filled in by the caller.

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     /// Decodes a mesh as the viewer does.
-    fn unpacked(packed: &PackedMesh, arrays: &[u8]) -> (Vec<[u16; 3]>, Vec<[u32; 3]>) {
+    fn unpack(packed: &PackedMesh, arrays: &[u8]) -> (Vec<[u16; 3]>, Vec<[u32; 3]>) {
         let (n, m) = (3 * packed.points, 3 * packed.triangles);
         let value = |at: usize, i: usize, n: usize, bytes: usize| {
             (0..bytes).fold(0u32, |v, b| v | u32::from(arrays[at + b * n + i]) << (8 * b))
@@ -145,7 +145,7 @@ mod tests {
         let ball = sphere(3, Vec3::new(5.0, 7.0, 9.0));
         let mut arrays = vec![1, 2, 3];
         let packed = append(&ball, &mut arrays);
-        let (points, triangles) = unpacked(&packed, &arrays);
+        let (points, triangles) = unpack(&packed, &arrays);
         let steps = |p: Vec3| {
             let (min, size) = (ball.bounds().min, ball.bounds().size());
             ((p - min) / size * STEPS).to_array().map(|x| x.round() as u16)

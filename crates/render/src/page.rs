@@ -47,7 +47,7 @@ pub fn html(data: &ReportData<'_>) -> String {
             .collect(),
         facts: &data.facts,
         checks: &data.checks,
-        notes: Warning::ranked(data.warnings)
+        notes: Warning::rank(data.warnings)
             .iter()
             .map(|w| note(w, &data.pieces))
             .collect(),
@@ -63,10 +63,10 @@ pub fn html(data: &ReportData<'_>) -> String {
     fill(
         TEMPLATE,
         &[
-            ("title", &escaped(&data.title)),
+            ("title", &escape(&data.title)),
             ("style", STYLE),
             ("header", &json),
-            ("arrays", &STANDARD.encode(deflated(&arrays))),
+            ("arrays", &STANDARD.encode(deflate(&arrays))),
             ("viewer", VIEWER),
         ],
     )
@@ -115,7 +115,7 @@ impl<'a> Figure<'a> {
     fn new((title, svg): &'a (String, String)) -> Self {
         Self {
             title,
-            source: format!("data:image/svg+xml,{}", percent_encoded(svg)),
+            source: format!("data:image/svg+xml,{}", percent_encode(svg)),
         }
     }
 }
@@ -248,7 +248,7 @@ pub(crate) fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> Triangle
 }
 
 /// Compresses with zlib. Equal input gives equal bytes.
-fn deflated(bytes: &[u8]) -> Vec<u8> {
+fn deflate(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     encoder
         .write_all(bytes)
@@ -268,7 +268,7 @@ pub(crate) fn align(arrays: &mut Vec<u8>) {
 
 /// Percent-encodes text for a URL. Charts consist mostly of pictures in base64, whose characters are kept:
 /// encoding all of them made charts a third larger.
-fn percent_encoded(text: &str) -> String {
+fn percent_encode(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for byte in text.bytes() {
         if byte.is_ascii_alphanumeric() || b"-_.~+/=,:;()".contains(&byte) {
@@ -281,7 +281,7 @@ fn percent_encoded(text: &str) -> String {
 }
 
 /// Escapes `text` for HTML, in attributes too.
-pub fn escaped(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -19,7 +19,7 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     let normals: Vec<Vec<[Vec3; 3]>> = pieces.par_iter().map(|p| crease_normals(p.mesh)).collect();
     let scene = |share: f64| -> Vec<Painted<'_>> {
         let all = pieces.iter().zip(&shifts).zip(&normals);
-        all.map(|((p, &shift), normals)| painted(p, share * shift, normals))
+        all.map(|((p, &shift), normals)| paint(p, share * shift, normals))
             .collect()
     };
     let (together, apart) = (scene(0.0), scene(1.0));
@@ -38,10 +38,10 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     in_order.sort_by_key(|&i| pieces[i].order);
     let small = |i: usize| from_inside(&pieces[i], &normals[i], all.center(), SMALL);
     let small: Vec<Image> = in_order.into_par_iter().map(small).collect();
-    stacked(Image::sheet(&large, 2), Image::sheet(&small, 3)).on([255; 3])
+    stack(Image::sheet(&large, 2), Image::sheet(&small, 3)).on([255; 3])
 }
 
-fn painted<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -> Painted<'a> {
+fn paint<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -> Painted<'a> {
     Painted {
         mesh: piece.mesh,
         color: piece.color,
@@ -58,7 +58,7 @@ pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3,
     // For a vertical line of sight, z is no usable up direction in the picture.
     let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
     render(
-        &[painted(piece, Vec3::ZERO, normals)],
+        &[paint(piece, Vec3::ZERO, normals)],
         &Camera::along(outwards, up),
         side,
         side,
@@ -66,7 +66,7 @@ pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3,
 }
 
 /// Stacks two pictures, aligned at the left edge.
-fn stacked(top: Image, bottom: Image) -> Image {
+fn stack(top: Image, bottom: Image) -> Image {
     let (width, height) = (top.width.max(bottom.width), top.height + bottom.height);
     let mut rgba = Vec::with_capacity(4 * width * height);
     for picture in [&top, &bottom] {

@@ -20,7 +20,7 @@ impl PatchId {
     }
 
     /// Piece with this number for people; `None` for 0.
-    pub fn numbered(number: u32) -> Option<Self> {
+    pub fn from_number(number: u32) -> Option<Self> {
         number.checked_sub(1).map(Self)
     }
 }
@@ -35,7 +35,7 @@ impl TryFrom<u32> for PatchId {
     type Error = &'static str;
 
     fn try_from(number: u32) -> Result<Self, Self::Error> {
-        Self::numbered(number).ok_or("pieces are numbered from 1")
+        Self::from_number(number).ok_or("pieces are numbered from 1")
     }
 }
 

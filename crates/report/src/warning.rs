@@ -146,18 +146,18 @@ impl Warning {
     }
 
     /// Tells code, severity and sentence.
-    pub fn told(&self) -> Told {
+    pub fn describe(&self) -> Told {
         self.cause.tell(&self.pieces)
     }
 
     /// Stable name for machines, for example `"seam-without-connector"`.
     pub fn code(&self) -> &'static str {
-        self.told().code
+        self.describe().code
     }
 
     /// Severity of the warning, by its cause.
     pub fn severity(&self) -> Severity {
-        self.told().severity
+        self.describe().severity
     }
 
     /// Returns the warning with other numbers for its pieces.
@@ -182,7 +182,7 @@ impl Warning {
     }
 
     /// Sorts warnings by severity, the most severe first; equal ones keep their order.
-    pub fn ranked(warnings: &[Self]) -> Vec<Self> {
+    pub fn rank(warnings: &[Self]) -> Vec<Self> {
         let mut ranked = warnings.to_vec();
         ranked.sort_by_key(|w| std::cmp::Reverse(w.severity()));
         ranked
@@ -191,19 +191,19 @@ impl Warning {
 
 impl PartialEq for Warning {
     fn eq(&self, other: &Self) -> bool {
-        (&self.pieces, self.at, self.told()) == (&other.pieces, other.at, other.told())
+        (&self.pieces, self.at, self.describe()) == (&other.pieces, other.at, other.describe())
     }
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.told().sentence)
+        f.write_str(&self.describe().sentence)
     }
 }
 
 impl From<Warning> for WarningEntry {
     fn from(warning: Warning) -> Self {
-        let told = warning.told();
+        let told = warning.describe();
         Self {
             code: told.code.to_owned(),
             severity: told.severity,
@@ -252,20 +252,20 @@ mod tests {
         }
     }
 
-    fn leaning(severity: Severity) -> Warning {
+    fn lean(severity: Severity) -> Warning {
         Warning::new(Leaning(PatchId(4), severity), vec![PatchId(0), PatchId(2)], None)
     }
 
     #[test]
     fn new_numbers_reach_the_pieces_of_a_warning_and_of_its_cause() {
-        let reversed = leaning(Severity::Note).renumber(&|PatchId(i)| PatchId(9 - i));
+        let reversed = lean(Severity::Note).renumber(&|PatchId(i)| PatchId(9 - i));
         assert_eq!(reversed.to_string(), "pieces 8, 10 lean on 6");
         let cause: &Leaning = reversed.cause().expect("it keeps its kind");
         assert_eq!(cause.0, PatchId(5));
-        assert_ne!(reversed, leaning(Severity::Note));
+        assert_ne!(reversed, lean(Severity::Note));
         assert_eq!(
             reversed.renumber(&|PatchId(i)| PatchId(9 - i)),
-            leaning(Severity::Note)
+            lean(Severity::Note)
         );
     }
 
@@ -277,15 +277,15 @@ mod tests {
             Severity::Warning,
             Severity::Problem,
         ]
-        .map(leaning);
-        let ranked = Warning::ranked(&all);
+        .map(lean);
+        let ranked = Warning::rank(&all);
         assert!(ranked.is_sorted_by_key(|w| std::cmp::Reverse(w.severity())));
         assert_eq!(ranked.len(), all.len());
     }
 
     #[test]
     fn each_interface_spells_the_settings_in_its_own_way() {
-        let entry = WarningEntry::from(leaning(Severity::Note));
+        let entry = WarningEntry::from(lean(Severity::Note));
         assert_eq!(
             entry.sentence_with(|name| format!("--{name}")),
             "pieces 1, 3 lean on 5 (--pieces, --size)"

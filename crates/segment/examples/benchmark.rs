@@ -39,7 +39,7 @@ fn main() {
             );
             return;
         }
-        let (labels, seconds) = timed(method, params, &mesh);
+        let (labels, seconds) = time(method, params, &mesh);
         println!(
             "{} faces, {} parts, {seconds:.2} s",
             mesh.triangles.len(),
@@ -64,7 +64,7 @@ fn main() {
             trace(id, &params, &mesh, &people);
             continue;
         }
-        let (labels, seconds) = timed(method, params.clone(), &mesh);
+        let (labels, seconds) = time(method, params.clone(), &mesh);
         if let Some(folder) = option("out=") {
             fs::create_dir_all(folder).expect("a folder");
             let lines: String = labels.iter().map(|l| format!("{l}\n")).collect();
@@ -96,7 +96,7 @@ fn divide(method: &str, params: Value, mesh: &TriMesh) -> Vec<u32> {
     }
 }
 
-fn timed(method: &str, params: Value, mesh: &TriMesh) -> (Vec<u32>, f64) {
+fn time(method: &str, params: Value, mesh: &TriMesh) -> (Vec<u32>, f64) {
     let start = Instant::now();
     let labels = divide(method, params, mesh);
     (labels, start.elapsed().as_secs_f64())

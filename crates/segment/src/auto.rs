@@ -16,7 +16,7 @@ use crate::coarse::Coarse;
 use crate::kmeans::{self, KMeansParams};
 use crate::random_cuts::{Divided, RandomCutsParams, divide_among};
 use crate::sdf::{self, SdfParams};
-use crate::shape_diameter::{diameters_mm, normalised};
+use crate::shape_diameter::{diameters_mm, normalise};
 use crate::whole::Whole;
 
 /// Number of levels of thickness, and weight of short borders, of each division proposed by shape diameters.
@@ -43,18 +43,18 @@ impl AutoParams {
 ///
 /// A mesh without any cut worth making, such as a ball, is one part.
 pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {
-    divide_keeping(params, mesh, &Whole::default()).part_of_face
+    divide_with_whole(params, mesh, &Whole::default()).part_of_face
 }
 
 /// Divides `mesh` without dividing a set of `whole`. Keeping these sets whole takes precedence over symmetry.
-pub fn divide_keeping(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Divided {
+pub fn divide_with_whole(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Divided {
     divide_among(&params.cuts, mesh, whole, |coarse| proposals(params, coarse))
 }
 
 /// Divisions of the coarse mesh that the other methods propose.
 fn proposals(params: &AutoParams, coarse: &Coarse) -> Vec<Vec<u32>> {
     let graph = &coarse.graph;
-    let values = normalised(&diameters_mm(&coarse.mesh, graph, SdfParams::default().n_rays));
+    let values = normalise(&diameters_mm(&coarse.mesh, graph, SdfParams::default().n_rays));
     let by_thickness = LEVELS.par_iter().map(|&(n_levels, smoothness)| {
         let sdf = SdfParams {
             n_levels,

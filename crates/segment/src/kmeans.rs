@@ -13,7 +13,7 @@ use shellock_geom::TriMesh;
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::params::{no_parts, outside};
-use crate::parts::connected;
+use crate::parts::number_parts;
 
 const MOST_ROUNDS: usize = 12;
 /// Number of faces of a patch that a representative tries in each round.
@@ -68,12 +68,12 @@ pub fn divide(params: &KMeansParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
     let labels = divide_graph(params, &coarse.graph);
-    connected(&fine, &coarse.bring_back(&fine, &labels)).0
+    number_parts(&fine, &coarse.bring_back(&fine, &labels)).0
 }
 
 /// Divides `graph`, which should be small: the part of each face.
 pub fn divide_graph(params: &KMeansParams, graph: &FaceGraph) -> Vec<u32> {
-    let (component, n_components) = connected(graph, &vec![0; graph.n_faces()]);
+    let (component, n_components) = number_parts(graph, &vec![0; graph.n_faces()]);
     let ways = ways(params, graph);
     let mut representatives = far_apart(params, graph, &ways, &component, n_components);
     let mut labels = Vec::new();
@@ -89,7 +89,7 @@ pub fn divide_graph(params: &KMeansParams, graph: &FaceGraph) -> Vec<u32> {
         }
         representatives = moved;
     }
-    connected(graph, &labels).0
+    number_parts(graph, &labels).0
 }
 
 /// Distance over each edge. Path length and angle are each measured in their mean over all edges.

@@ -20,7 +20,7 @@ use shellock_geom::TriMesh;
 use shellock_geom::bvh::TriangleBvh;
 
 use crate::face_graph::FaceGraph;
-use crate::parts::{absorb_small, connected, sums};
+use crate::parts::{absorb_small, number_parts, sums};
 use crate::symmetry::Plane;
 
 /// Share of a part's area on one side from which the part counts as lying there, not across the plane.
@@ -91,6 +91,6 @@ impl Mirrored {
                 }
             })
             .collect();
-        absorb_small(graph, &connected(graph, &drawn).0, CRUMB_SHARE)
+        absorb_small(graph, &number_parts(graph, &drawn).0, CRUMB_SHARE)
     }
 }

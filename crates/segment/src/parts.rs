@@ -6,7 +6,7 @@ use crate::face_graph::FaceGraph;
 
 /// Numbers the connected sets of equal `labels` from 0, by their lowest face. Returns the part of each face
 /// and the number of parts.
-pub fn connected(graph: &FaceGraph, labels: &[u32]) -> (Vec<u32>, usize) {
+pub fn number_parts(graph: &FaceGraph, labels: &[u32]) -> (Vec<u32>, usize) {
     let mut part = vec![u32::MAX; labels.len()];
     let mut n_parts = 0;
     let mut stack = Vec::new();
@@ -49,7 +49,7 @@ pub fn merge(
     weight: &[f64],
     cost: impl Fn(&Border) -> Option<f64>,
 ) -> Vec<u32> {
-    let (mut part, n_parts) = connected(graph, labels);
+    let (mut part, n_parts) = number_parts(graph, labels);
     let mut area = sums(&part, n_parts, &graph.area_mm2);
     let mut borders: Vec<BTreeMap<u32, [f64; 2]>> = vec![BTreeMap::new(); n_parts];
     for (crease, &w) in graph.creases.iter().zip(weight) {
@@ -101,7 +101,7 @@ pub fn merge(
             *p = into[*p as usize];
         }
     }
-    connected(graph, &part).0
+    number_parts(graph, &part).0
 }
 
 /// Border of two neighbouring parts, with the data that a merge depends on.

@@ -17,7 +17,7 @@ use shellock_geom::{TriMesh, Vec3};
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::params::{no_parts, outside};
-use crate::parts::connected;
+use crate::parts::number_parts;
 
 /// Number of points that a fit uses, about; larger parts are sampled evenly.
 const MOST_POINTS: usize = 300;
@@ -69,7 +69,7 @@ pub fn divide(params: &PrimitivesParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
     let labels = divide_coarse(params, &coarse.mesh, &coarse.graph);
-    connected(&fine, &coarse.bring_back(&fine, &labels)).0
+    number_parts(&fine, &coarse.bring_back(&fine, &labels)).0
 }
 
 /// A possible merge: the error's bits, both parts, and their ages, which reveal outdated offers.
@@ -132,7 +132,7 @@ pub fn divide_coarse(params: &PrimitivesParams, mesh: &TriMesh, graph: &FaceGrap
     for (part, faces) in faces.iter().enumerate() {
         faces.iter().for_each(|&f| labels[f as usize] = part as u32);
     }
-    connected(graph, &labels).0
+    number_parts(graph, &labels).0
 }
 
 /// Corners of triangles, to which primitives are fitted, relative to the model's centre.

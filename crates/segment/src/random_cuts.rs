@@ -31,7 +31,7 @@ use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
 use crate::mirrored::Mirrored;
 use crate::params::{no_parts, outside};
-use crate::parts::connected;
+use crate::parts::number_parts;
 use crate::symmetry::{self, Plane};
 use crate::whole::Whole;
 
@@ -114,15 +114,16 @@ pub struct Divided {
 
 /// Divides `mesh` by random cuts: the part of each face.
 pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
-    divide_keeping(params, mesh, &Whole::default()).part_of_face
+    divide_with_whole(params, mesh, &Whole::default()).part_of_face
 }
 
 /// Divides `mesh` without dividing a set of `whole`. Keeping these sets whole takes precedence over symmetry.
-pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Divided {
+pub fn divide_with_whole(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Divided {
     divide_among(params, mesh, whole, |_| Vec::new())
 }
 
-/// Divides like [`divide_keeping`], with divisions of the coarse mesh by other methods as further candidates.
+/// Divides like [`divide_with_whole`], with divisions of the coarse mesh by other methods as further
+/// candidates.
 pub(crate) fn divide_among(
     params: &RandomCutsParams,
     mesh: &TriMesh,
@@ -138,11 +139,11 @@ pub(crate) fn divide_among(
     for labels in &mut proposals {
         on_coarse.gather(labels, &graph.area_mm2);
     }
-    let found = hierarchy_keeping(params, graph, &proposals, &on_coarse);
+    let found = hierarchy_with_whole(params, graph, &proposals, &on_coarse);
     let mut labels = match &plane {
         Some(plane) => {
             let mirrored = Mirrored::new(plane, &coarse.mesh, graph);
-            let labels = coarse.bring_back(&fine, &found.mirrored(params, graph, &mirrored));
+            let labels = coarse.bring_back(&fine, &found.mirror(params, graph, &mirrored));
             // Borders have settled on each side on their own, so symmetry must be restored.
             Mirrored::new(plane, mesh, &fine).labels(&fine, &labels)
         }
@@ -150,7 +151,7 @@ pub(crate) fn divide_among(
     };
     whole.gather(&mut labels, &fine.area_mm2);
     Divided {
-        part_of_face: connected(&fine, &labels).0,
+        part_of_face: number_parts(&fine, &labels).0,
         plane,
     }
 }
@@ -237,12 +238,12 @@ impl Hierarchy {
                 p as u32
             })
             .collect();
-        connected(graph, &labels).0
+        number_parts(graph, &labels).0
     }
 
     /// Symmetric parts after as many cuts as `params` asks for. Uses fewer cuts if mirroring would make more
     /// parts than requested.
-    fn mirrored(&self, params: &RandomCutsParams, graph: &FaceGraph, mirrored: &Mirrored) -> Vec<u32> {
+    fn mirror(&self, params: &RandomCutsParams, graph: &FaceGraph, mirrored: &Mirrored) -> Vec<u32> {
         let most = params.n_parts.unwrap_or(usize::MAX).max(self.n_components);
         let after = |n_steps: usize| mirrored.labels(graph, &self.labels(graph, n_steps));
         let n_parts = |labels: &[u32]| labels.iter().max().map_or(0, |&l| l as usize + 1);
@@ -257,12 +258,12 @@ impl Hierarchy {
 ///
 /// The borders of `proposals`, other divisions of `graph`, are candidates beside the random cuts.
 pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
-    hierarchy_keeping(params, graph, proposals, &Whole::default())
+    hierarchy_with_whole(params, graph, proposals, &Whole::default())
 }
 
 /// Makes cuts like [`hierarchy`], but none through a set of `whole`. Edges within a set cost more than all
 /// others together, so a cut over them has a score of 0.
-pub fn hierarchy_keeping(
+pub fn hierarchy_with_whole(
     params: &RandomCutsParams,
     graph: &FaceGraph,
     proposals: &[Vec<u32>],
@@ -272,7 +273,7 @@ pub fn hierarchy_keeping(
         params,
         graph,
         proposals,
-        price: prices_keeping(graph, whole),
+        price: prices_with_whole(graph, whole),
         way: graph
             .creases
             .iter()
@@ -280,7 +281,7 @@ pub fn hierarchy_keeping(
             .collect(),
         total_mm2: graph.total_area_mm2(),
     };
-    let (mut labels, n_components) = connected(graph, &vec![0; graph.n_faces()]);
+    let (mut labels, n_components) = number_parts(graph, &vec![0; graph.n_faces()]);
     let mut parts: Vec<Vec<u32>> = vec![Vec::new(); n_components];
     for (face, &label) in labels.iter().enumerate() {
         parts[label as usize].push(face as u32);
@@ -323,7 +324,7 @@ pub fn hierarchy_keeping(
 }
 
 /// Prices by [`prices`]; edges within sets of `whole` get a price that no cut can pay.
-fn prices_keeping(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
+fn prices_with_whole(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
     /// Multiple of the prices of all edges together, so large that e to the power of minus it is 0.
     const UNPAYABLE: f64 = 1e4;
     let mut price = prices(graph);
@@ -386,7 +387,7 @@ impl Cutter<'_> {
                 region.random_cut(&mut rng)
             })
             .collect();
-        cuts.extend(self.proposals.iter().flat_map(|labels| region.proposed(labels)));
+        cuts.extend(self.proposals.iter().flat_map(|labels| region.propose(labels)));
         let mut share = vec![0.0; self.graph.creases.len()];
         for cut in &cuts {
             for &crease in &cut.creases {
@@ -513,7 +514,7 @@ impl<'a> Region<'a> {
 
     /// Finds the cuts that separate one label of `labels` from the rest of the part, if both sides are
     /// connected.
-    fn proposed(&self, labels: &[u32]) -> Vec<Cut> {
+    fn propose(&self, labels: &[u32]) -> Vec<Cut> {
         let label = |f: u32| labels[self.faces[f as usize] as usize];
         let mut found: Vec<u32> = (0..self.faces.len() as u32).map(label).collect();
         found.sort_unstable();

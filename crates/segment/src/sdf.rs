@@ -10,8 +10,8 @@ use shellock_geom::TriMesh;
 use crate::face_graph::FaceGraph;
 use crate::labelling::expand;
 use crate::params::{no_parts, outside};
-use crate::parts::{absorb_small, connected, merge_to};
-use crate::shape_diameter::{diameters_mm, normalised};
+use crate::parts::{absorb_small, merge_to, number_parts};
+use crate::shape_diameter::{diameters_mm, normalise};
 use crate::{border, mixture};
 
 /// Weight of a convex edge's turning, relative to a concave one's.
@@ -71,7 +71,7 @@ impl SdfParams {
 /// Divides `mesh` by its shape diameter: the part of each face.
 pub fn divide(params: &SdfParams, mesh: &TriMesh) -> Vec<u32> {
     let graph = FaceGraph::new(mesh);
-    let values = normalised(&diameters_mm(mesh, &graph, params.n_rays));
+    let values = normalise(&diameters_mm(mesh, &graph, params.n_rays));
     divide_by(params, &graph, &values)
 }
 
@@ -82,7 +82,7 @@ pub fn divide_by(params: &SdfParams, graph: &FaceGraph, values: &[f64]) -> Vec<u
     for n_levels in params.n_levels..params.n_levels + 3 {
         let labels = level_labels(params, n_levels, graph, values);
         let labels = absorb_small(graph, &labels, params.least_share);
-        found = connected(graph, &labels);
+        found = number_parts(graph, &labels);
         if enough(found.1) {
             break;
         }

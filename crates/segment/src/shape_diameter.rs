@@ -45,7 +45,7 @@ pub fn diameters_mm(mesh: &TriMesh, graph: &FaceGraph, n_rays: usize) -> Vec<f64
 
 /// Scales diameters to [0, 1], spreading small ones: log(4 x + 1) / log 5, where x is the position between
 /// the least and the largest.
-pub fn normalised(diameters_mm: &[f64]) -> Vec<f64> {
+pub fn normalise(diameters_mm: &[f64]) -> Vec<f64> {
     let least = diameters_mm.iter().copied().fold(f64::INFINITY, f64::min);
     let range = diameters_mm.iter().copied().fold(0.0, f64::max) - least;
     diameters_mm
@@ -180,17 +180,17 @@ fn smooth(graph: &FaceGraph, values: &[f64]) -> Vec<f64> {
 struct Window {
     faces: Vec<(u32, u32)>,
     /// Last window that each face was in, counted from 1.
-    seen: Vec<u32>,
+    last_window: Vec<u32>,
     n_windows: u32,
 }
 
 impl Window {
     fn fill(&mut self, graph: &FaceGraph, face: u32, n_rings: u32) {
         self.faces.clear();
-        self.seen.resize(graph.n_faces(), 0);
+        self.last_window.resize(graph.n_faces(), 0);
         self.n_windows += 1;
         self.faces.push((face, 0));
-        self.seen[face as usize] = self.n_windows;
+        self.last_window[face as usize] = self.n_windows;
         let mut at = 0;
         while let Some(&(face, ring)) = self.faces.get(at) {
             at += 1;
@@ -198,7 +198,8 @@ impl Window {
                 break;
             }
             for &(other, _) in graph.arcs(face) {
-                if std::mem::replace(&mut self.seen[other as usize], self.n_windows) != self.n_windows {
+                if std::mem::replace(&mut self.last_window[other as usize], self.n_windows) != self.n_windows
+                {
                     self.faces.push((other, ring + 1));
                 }
             }
@@ -219,7 +220,7 @@ mod tests {
         let flat = (0..12).find(|&f| graph.normal[f].z.abs() > 0.5).unwrap();
         // Rays lean by up to 60° and are averaged by angle, so a plate seems a little thicker.
         assert!(found[flat] > 2.0 && found[flat] < 4.0, "{}", found[flat]);
-        let spread = normalised(&[1.0, 3.0, 5.0]);
+        let spread = normalise(&[1.0, 3.0, 5.0]);
         assert!(spread[0] == 0.0 && spread[1] > 0.5 && spread[2] == 1.0);
     }
 }

@@ -87,9 +87,9 @@ pub fn nearest_plane(mesh: &TriMesh) -> Option<(f64, Plane)> {
     }
     let (_, rough) = best
         .into_iter()
-        .map(|(_, plane)| figure.refined(plane, &few, 0.1))
+        .map(|(_, plane)| figure.refine(plane, &few, 0.1))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(figure.refined(rough, &figure.samples, 0.02))
+    Some(figure.refine(rough, &figure.samples, 0.02))
 }
 
 /// Surface and sample points against which planes are judged.
@@ -149,7 +149,7 @@ impl Figure {
     }
 
     /// Turns and moves `plane` while that lowers the deviation of `points`. The first step is `first_rad`.
-    fn refined(&self, plane: Plane, points: &[Vec3], first_rad: f64) -> (f64, Plane) {
+    fn refine(&self, plane: Plane, points: &[Vec3], first_rad: f64) -> (f64, Plane) {
         /// Step at which refinement ends, rad: 0.06°.
         const LAST_RAD: f64 = 1e-3;
         /// Largest number of steps of one length.

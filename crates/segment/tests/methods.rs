@@ -13,7 +13,7 @@ use shellock_segment::{border, coarse::Coarse, face_graph::FaceGraph, parts};
 
 /// A body of revolution about z with the outline (z, radius), bottom first. Both ends are closed by a point
 /// on the axis.
-fn turned(outline: &[(f64, f64)], n_around: u32) -> TriMesh {
+fn turn(outline: &[(f64, f64)], n_around: u32) -> TriMesh {
     let mut points = vec![Vec3::new(0.0, 0.0, outline[0].0)];
     for &(z, radius) in outline {
         points.extend((0..n_around).map(|i| {
@@ -46,7 +46,7 @@ fn dumbbell() -> TriMesh {
             (z, ball.max(3.0))
         })
         .collect();
-    turned(&outline, 20)
+    turn(&outline, 20)
 }
 
 /// A cylinder of radius 5 and height 20, with plane faces at both ends.
@@ -56,7 +56,7 @@ fn cylinder() -> TriMesh {
     let mut top = ends(20.0);
     top.reverse();
     let outline: Vec<(f64, f64)> = ends(0.0).into_iter().chain(side).chain(top).collect();
-    turned(&outline, 24)
+    turn(&outline, 24)
 }
 
 fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
@@ -175,7 +175,7 @@ fn parts_are_connected_and_the_same_on_any_number_of_threads() {
     for (name, divide) in METHODS {
         let labels = on(1, divide);
         assert_eq!(labels, on(2, divide), "{name}");
-        assert_eq!(parts::connected(&graph, &labels).0, labels, "{name}");
+        assert_eq!(parts::number_parts(&graph, &labels).0, labels, "{name}");
     }
 }
 
@@ -257,8 +257,8 @@ fn no_border_of_cuts_divides_what_is_kept_whole() {
         .filter(|&f| mesh.face_center(f as usize).z.abs() < 4.0)
         .collect();
     let whole = Whole::new(mesh.triangles.len(), [neck.clone()]);
-    let by_auto = auto::divide_keeping(&AutoParams::default(), &mesh, &whole).part_of_face;
-    let by_cuts = random_cuts::divide_keeping(&RandomCutsParams::default(), &mesh, &whole).part_of_face;
+    let by_auto = auto::divide_with_whole(&AutoParams::default(), &mesh, &whole).part_of_face;
+    let by_cuts = random_cuts::divide_with_whole(&RandomCutsParams::default(), &mesh, &whole).part_of_face;
     for labels in [by_auto, by_cuts] {
         assert!(
             neck.iter()

@@ -18,7 +18,7 @@ fn figure() -> Vec<Capsule> {
         limb([7.0, 0.0, 7.0], [27.0, 6.0, 13.0], 3.0),
         limb([5.0, 0.0, -12.0], [9.0, 4.0, -36.0], 3.5),
     ];
-    let other = one_side.map(|(a, b, r)| (flipped(a), flipped(b), r));
+    let other = one_side.map(|(a, b, r)| (flip(a), flip(b), r));
     let middle = [
         limb([0.0, 0.0, -9.0], [0.0, 0.0, 8.0], 9.0),
         limb([0.0, 3.0, 23.0], [0.0, 5.0, 23.0], 7.0),
@@ -26,7 +26,7 @@ fn figure() -> Vec<Capsule> {
     one_side.into_iter().chain(other).chain(middle).collect()
 }
 
-fn flipped(p: Vec3) -> Vec3 {
+fn flip(p: Vec3) -> Vec3 {
     p.with_x(-p.x)
 }
 
@@ -126,8 +126,8 @@ fn both_ways(cuts: &RandomCutsParams, mesh: &TriMesh) -> [Divided; 2] {
     let whole = Whole::default();
     let auto = AutoParams { cuts: cuts.clone() };
     [
-        auto::divide_keeping(&auto, mesh, &whole),
-        random_cuts::divide_keeping(cuts, mesh, &whole),
+        auto::divide_with_whole(&auto, mesh, &whole),
+        random_cuts::divide_with_whole(cuts, mesh, &whole),
     ]
 }
 
@@ -191,11 +191,11 @@ fn a_limb_without_a_twin_stays_a_part_and_gets_no_image() {
         symmetric: true,
         ..RandomCutsParams::default()
     };
-    let found = auto::divide_keeping(&AutoParams { cuts: symmetric }, &mesh, &Whole::default());
+    let found = auto::divide_with_whole(&AutoParams { cuts: symmetric }, &mesh, &Whole::default());
     assert!(found.plane.is_some());
     let bvh = TriangleBvh::new(&mesh);
     let part = |p: Vec3| found.part_of_face[bvh.nearest(p, f64::INFINITY).unwrap().face as usize];
-    let body = part(flipped(root));
+    let body = part(flip(root));
     assert_ne!(part(tip), body);
     // The part at the missing twin's place, the body, lies across the plane.
     let reaches = |side: f64| {

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             for (piece, mesh) in made.kit.pieces.iter() {
                 fs::write(format!("{folder}/piece-{piece}.stl"), write_stl_binary(mesh))?;
             }
-            let (n, passed) = (made.kit.pieces.len(), made.kit.verification.passed());
+            let (n, passed) = (made.kit.pieces.len(), made.kit.verification.has_passed());
             println!("{n} pieces; all checks hold: {passed}");
         }
         DesignOutcome::NoPlan { reason, .. } => println!("no plan: {reason}"),

@@ -214,7 +214,7 @@ proptest! {
         prop_assume!(normal.length() > 0.1 && slide.cross(normal).length() > 0.01);
         let normal = normal.normalize();
         let slide = slide.reject_from_normalized(normal).normalize();
-        let (turn, along) = Turn::laying(normal, slide);
+        let (turn, along) = Turn::align(normal, slide);
         prop_assert!(turn.apply(slide).distance(along.unit()) < 1e-9);
         prop_assert!((turn.apply(normal).abs().max_element() - 1.0).abs() < 1e-9);
         prop_assert!(turn.inverse().apply(turn.apply(a)).distance(a) < 1e-9);

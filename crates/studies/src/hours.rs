@@ -118,10 +118,10 @@ fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
         let plates = lay(&printer, &printables);
         let (mut told, mut ours) = (Cost::default(), Cost::default());
         for plate in 0..plates.n_plates {
-            let laid: Vec<&Laid> = plates.laid.iter().filter(|l| l.plate == plate).collect();
+            let laid: Vec<&Laid> = plates.poses.iter().filter(|l| l.plate == plate).collect();
             let objects = laid
                 .iter()
-                .map(|l| object(&kit.pieces[l.piece], l.turned, l.moved_mm))
+                .map(|l| object(&kit.pieces[l.piece], l.axes, l.moved_mm))
                 .collect::<Vec<_>>();
             let load = laid.iter().fold(Load::default(), |sum, l| sum.and(l.load));
             ours = ours.and(Cost::of(&printer, &load));
@@ -131,12 +131,8 @@ fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
             path: folder.clone(),
             problem: "the whole model cannot be laid".into(),
         })?;
-        let whole = slicer.cost(
-            &printer,
-            &[object(&kit.whole, alone.turned, alone.moved_mm)],
-            true,
-        )?;
-        let marks_mm2: f64 = plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let whole = slicer.cost(&printer, &[object(&kit.whole, alone.axes, alone.moved_mm)], true)?;
+        let marks_mm2: f64 = plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let row = row(
             folder,
             [told, ours, whole, Cost::of(&printer, &alone.load)],
@@ -190,7 +186,7 @@ fn object(mesh: &TriMesh, turned: [[f64; 3]; 3], moved_mm: [f64; 3]) -> NamedObj
         name: "print",
         color: [200; 3],
         mesh,
-        turned: Some(turned),
+        rotation: Some(turned),
         moved_mm,
     }
 }

@@ -36,7 +36,7 @@ pub fn finer(name: &str, loaded: &Loaded) -> Option<(String, Vec<u8>)> {
         .all(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint));
     let longest_mm = loaded.unit_mm.unwrap_or(1.0) * loaded.bounds().size().max_element();
     // A size that relies on the file's own unit alone would be lost, too.
-    let keeps_size = !loaded.unit_is_stated || is_usual(longest_mm);
+    let keeps_size = !loaded.has_unit || is_usual(longest_mm);
     if !keeps_all || !keeps_size || !is_coarse(loaded) {
         return None;
     }

@@ -53,7 +53,7 @@ impl Seam {
 impl Seam {
     /// Resamples the seam at `n` + 1 points at equal distances, with their unnormalised normals; none where
     /// the seam has no length.
-    pub fn resampled(&self, n: usize) -> Vec<(Vec3, Vec3)> {
+    pub fn resample(&self, n: usize) -> Vec<(Vec3, Vec3)> {
         let total = self.length();
         if self.points.len() < 2
             || self.normals.len() != self.points.len()
@@ -91,7 +91,7 @@ impl Seam {
         /// Rounds of averaging the normals with their neighbours: bumps narrower than some steps do not show
         /// inside.
         const ROUNDS: usize = 3;
-        let stations = self.resampled(n);
+        let stations = self.resample(n);
         let mut normals: Vec<Vec3> = stations.iter().map(|s| s.1).collect();
         for _ in 0..ROUNDS {
             let old = normals.clone();

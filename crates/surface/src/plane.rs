@@ -61,7 +61,7 @@ impl Plane {
     }
 
     /// Least-squares plane through the `spots` on this plane, if more area lies on it; else this plane.
-    pub fn refined(self, spots: &[Spot]) -> Self {
+    pub fn refine(self, spots: &[Spot]) -> Self {
         let inliers: Vec<Spot> = spots.iter().copied().filter(|s| self.has(s)).collect();
         let Some((at, normal)) = least_squares_plane(&inliers, self.normal) else {
             return self;

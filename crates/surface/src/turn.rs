@@ -20,7 +20,7 @@ impl Default for Turn {
 impl Turn {
     /// Smallest rotation that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice
     /// direction perpendicular to that axis. Also returns that direction.
-    pub fn laying(normal: Vec3, slide: Vec3) -> (Self, LatticeDirection) {
+    pub fn align(normal: Vec3, slide: Vec3) -> (Self, LatticeDirection) {
         let axis = [Vec3::X, Vec3::Y, Vec3::Z]
             .into_iter()
             .flat_map(|a| [a, -a])

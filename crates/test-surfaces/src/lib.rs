@@ -72,7 +72,7 @@ pub fn seams(surface: &SegmentedSurface) -> Vec<Seam> {
     let mut normal = vec![Vec3::ZERO; surface.mesh.points.len()];
     for (&(u, v), &f) in &owner {
         let (a, b) = (surface.patch_of_face[f], surface.patch_of_face[owner[&(v, u)]]);
-        normal[u as usize] += surface.mesh.area_vector_doubled(f);
+        normal[u as usize] += surface.mesh.double_area_vector(f);
         if a < b {
             pairs.entry((a, b)).or_default().insert((u, v));
         }

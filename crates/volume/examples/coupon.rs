@@ -218,7 +218,7 @@ fn ours(params: &VolumeParams, case: &Case) -> Any<Moved> {
         .filter(|(_, p)| p.x.abs() > WIDTH - 1e-9)
         .map(|(i, _)| i)
         .collect();
-    let model = VolumeModel::clamped(params, &plates, &clamped)?;
+    let model = VolumeModel::with_clamp(params, &plates, &clamped)?;
     let joint = Joint {
         male: Side::A,
         leaves: case.frame.s,

@@ -54,7 +54,7 @@ pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -
         if is_end[0] {
             bars.push_own(&to_ends[0]);
         }
-        if !bars.push_shared([from.station, to.station]) {
+        if !bars.push_pair([from.station, to.station]) {
             bars.push_own(&from);
             bars.push_own(&to);
         }
@@ -107,7 +107,7 @@ struct Bars<'a> {
 
 impl Bars<'_> {
     /// Adds the two bars between two stations, if both are joined alike. Returns false otherwise.
-    fn push_shared(&mut self, [from, to]: [usize; 2]) -> bool {
+    fn push_pair(&mut self, [from, to]: [usize; 2]) -> bool {
         let males = [from, to].map(|s| self.plan[s].joint.map(|joint| joint.male));
         let tets = SIDES.map(|side| {
             let [first, second] = [from, to].map(|s| self.sections[s][side.index()].as_ref());

@@ -203,7 +203,7 @@ struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
     /// Solver with the model held where it stands.
-    standing: VolumeModel,
+    at_rest: VolumeModel,
     /// Solver with the model held nowhere.
     free: VolumeModel,
 }
@@ -217,12 +217,12 @@ impl<'a> Bench<'a> {
             ..VolumeParams::default()
         };
         let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
-        let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
+        let at_rest = VolumeModel::with_clamp(&volume, &model.assembly, &held)?;
         let free = VolumeModel::new(&volume, &model.assembly)?;
         Ok(Self {
             params,
             model,
-            standing,
+            at_rest,
             free,
         })
     }
@@ -235,7 +235,7 @@ impl<'a> Bench<'a> {
         let punch = spread(assembly, &fist, -up * self.params.punch_n);
         let impact_n = impact_n(self.free.mass_t(), self.params.drop_mm);
         let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
-        let punched = self.standing.under_load(meetings, &punch)?;
+        let punched = self.at_rest.under_load(meetings, &punch)?;
         let fallen = self.free.under_load(meetings, &impact)?;
         Ok(Pair {
             punch: self.outcome(punched, meetings, self.params.punch_n),

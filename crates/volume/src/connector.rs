@@ -450,7 +450,7 @@ impl Accumulator {
 /// of consecutive bars.
 ///
 /// Halves are condensed first, then joined: the remainder of each is short, however long the seam.
-pub(super) fn condensed(
+pub(super) fn condense(
     fronts: &[Front],
     bars: &[&Bar],
     labels: Labels,
@@ -463,14 +463,14 @@ pub(super) fn condensed(
     ) -> Result<Front, SparseError> {
         let to = from + fronts.len();
         if let [front] = fronts {
-            return Front::condensed(&[front], |id| is_inside(id, from, to));
+            return Front::condense(&[front], |id| is_inside(id, from, to));
         }
         let (left, right) = fronts.split_at(fronts.len() / 2);
         let halves = [
             reduce(left, from, is_inside)?,
             reduce(right, from + left.len(), is_inside)?,
         ];
-        Front::condensed(&[&halves[0], &halves[1]], |id| is_inside(id, from, to))
+        Front::condense(&[&halves[0], &halves[1]], |id| is_inside(id, from, to))
     }
     let is_inside = |id: u32, from: usize, to: usize| match labels.owner(id) {
         Owner::Part => false,

@@ -9,7 +9,7 @@
 //!     along n: δ = 0         along ŝ and across walls: δ ≥ 0, λ ≥ 0, δ λ = 0         along u: λ = 0
 //! ```
 
-use shellock_geom::sparse::{SparseError, eliminate_leading};
+use shellock_geom::sparse::{SparseError, eliminate_first};
 
 use super::rows::Law;
 
@@ -93,7 +93,7 @@ struct Eliminated {
 
 impl Eliminated {
     fn new(mut values: Vec<f64>, n: usize, k: usize) -> Result<Self, SparseError> {
-        eliminate_leading(&mut values, n, k)?;
+        eliminate_first(&mut values, n, k)?;
         Ok(Self { values, n, k })
     }
 
@@ -103,7 +103,7 @@ impl Eliminated {
     }
 
     /// Solution of the eliminated unknowns, where the others are `rest`.
-    fn eliminated(&self, rest: &[f64]) -> Vec<f64> {
+    fn back_substitute(&self, rest: &[f64]) -> Vec<f64> {
         let (n, k) = (self.n, self.k);
         let mut x: Vec<f64> = (0..k)
             .map(|i| {
@@ -142,7 +142,7 @@ pub(super) fn solve(
     let mut force_n = vec![0.0; laws.len()];
     for (&row, force) in order
         .iter()
-        .zip(whole.eliminated(&rest).into_iter().chain(pushes))
+        .zip(whole.back_substitute(&rest).into_iter().chain(pushes))
     {
         force_n[row] = force;
     }
@@ -291,6 +291,6 @@ fn with_active(
         coarse[n_motions + n * column] = -coarse[n_motions + n * column];
         coarse[column * (n + 1)] += GROUND_STIFFNESS * stiffest;
     }
-    let motion = Eliminated::new(coarse, n, n_motions)?.eliminated(&[]);
-    Ok((forces.eliminated(&motion), motion))
+    let motion = Eliminated::new(coarse, n, n_motions)?.back_substitute(&[]);
+    Ok((forces.back_substitute(&motion), motion))
 }

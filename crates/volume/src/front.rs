@@ -1,6 +1,6 @@
 //! Dense blocks of a large symmetric matrix, assembled and eliminated one after the other.
 
-use shellock_geom::sparse::{SparseError, eliminate_leading};
+use shellock_geom::sparse::{SparseError, eliminate_first};
 
 /// Symmetric matrix between labelled unknowns: lower triangle, column-major.
 #[derive(Clone, Debug, Default)]
@@ -12,7 +12,7 @@ pub(super) struct Front {
 impl Front {
     /// Sums `fronts` and eliminates the unknowns chosen by `is_eliminated`; the others remain, in ascending
     /// order.
-    pub fn condensed(fronts: &[&Self], is_eliminated: impl Fn(u32) -> bool) -> Result<Self, SparseError> {
+    pub fn condense(fronts: &[&Self], is_eliminated: impl Fn(u32) -> bool) -> Result<Self, SparseError> {
         let mut ids: Vec<u32> = fronts.iter().flat_map(|f| &f.ids).copied().collect();
         let key = |id: u32| (!is_eliminated(id), id);
         ids.sort_unstable_by_key(|&id| key(id));
@@ -42,7 +42,7 @@ impl Front {
                 }
             }
         }
-        eliminate_leading(&mut values, n, n_eliminated)?;
+        eliminate_first(&mut values, n, n_eliminated)?;
         let kept = n - n_eliminated;
         let mut rest = Vec::with_capacity(kept * kept);
         for column in n_eliminated..n {

@@ -191,17 +191,17 @@ pub struct VolumeModel {
     near: Vec<[Vec<u32>; 2]>,
     parts: Vec<Part>,
     /// Index of each wall node among its part's kept nodes.
-    place_kept: Vec<Option<u32>>,
+    kept_index: Vec<Option<u32>>,
 }
 
 impl VolumeModel {
     /// Builds and condenses the walls; takes about a second for 18 000 tetrahedra.
     pub fn new(params: &VolumeParams, assembly: &ShellAssembly) -> Result<Self, VolumeError> {
-        Self::clamped(params, assembly, &[])
+        Self::with_clamp(params, assembly, &[])
     }
 
     /// Builds the model with the wall below the points `clamped` held in place.
-    pub fn clamped(
+    pub fn with_clamp(
         params: &VolumeParams,
         assembly: &ShellAssembly,
         clamped: &[u32],
@@ -249,10 +249,10 @@ impl VolumeModel {
                 )
             })
             .collect::<Result<_, _>>()?;
-        let mut place_kept = vec![None; wall.nodes.len()];
+        let mut kept_index = vec![None; wall.nodes.len()];
         for part in &parts {
-            for (place, &node) in (0..).zip(&part.kept) {
-                place_kept[node as usize] = Some(place);
+            for (place, &node) in (0..).zip(&part.seam_nodes) {
+                kept_index[node as usize] = Some(place);
             }
         }
         let below =
@@ -267,7 +267,7 @@ impl VolumeModel {
             is_clamped,
             near,
             parts,
-            place_kept,
+            kept_index,
             wall,
         })
     }
@@ -295,7 +295,7 @@ impl VolumeModel {
             Ok(deflection) => {
                 let widest = |[a, b]: &[[Vec3; 2]; 2]| a[0].distance(b[0]).max(a[1].distance(b[1]));
                 let openings = deflection.displacement_mm.iter().map(widest).collect();
-                Opening::rated(plan, openings).resistance(plan, |station| {
+                Opening::rate(plan, openings).resistance(plan, |station| {
                     self.station_parts[station]
                         .into_iter()
                         .filter(|part| *part != fixed_part)
@@ -387,7 +387,7 @@ impl VolumeModel {
                 .map(|front| front.without(|id| labels.is_wall(id)))
                 .collect();
         }
-        let mut fronts = connector::condensed(&fronts, &own, labels, &spans)?;
+        let mut fronts = connector::condense(&fronts, &own, labels, &spans)?;
         if !is_fixed {
             fronts.extend(self.wall_fronts(part, plan, labels));
         }
@@ -395,7 +395,7 @@ impl VolumeModel {
         let all: Vec<&Front> = wall.into_iter().chain(&fronts).collect();
         Ok(self.read(
             part,
-            &Front::condensed(&all, |id| labels.is_inner(id))?,
+            &Front::condense(&all, |id| labels.is_inner(id))?,
             labels,
             plan,
             sections,
@@ -403,7 +403,10 @@ impl VolumeModel {
     }
 
     fn labels(&self, part: u32) -> Labels {
-        Labels::new(3 * self.parts[part as usize].kept.len(), self.stations.len())
+        Labels::new(
+            3 * self.parts[part as usize].seam_nodes.len(),
+            self.stations.len(),
+        )
     }
 
     /// Bars of `part`, the range of them that meets at each section, and the front of each bar.
@@ -500,7 +503,7 @@ impl VolumeModel {
         });
         let weights = connector::interpolation(tets, x).into_iter();
         weights
-            .filter_map(|(node, w)| Some((self.place_kept[node as usize]?, w)))
+            .filter_map(|(node, w)| Some((self.kept_index[node as usize]?, w)))
             .collect()
     }
 }

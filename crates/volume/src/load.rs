@@ -110,18 +110,18 @@ impl VolumeModel {
             .collect::<Result<Vec<_>, _>>()?;
         loads_n
             .iter()
-            .map(|forces_n| self.loaded(plan, &sections, &mut bodies, forces_n))
+            .map(|forces_n| self.apply_load(plan, &sections, &mut bodies, forces_n))
             .collect()
     }
 
-    fn loaded(
+    fn apply_load(
         &self,
         plan: &[Meeting],
         sections: &Sections,
         bodies: &mut [Body<'_>],
         forces_n: &[Vec3],
     ) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
-        let balanced_n = self.balanced(forces_n)?;
+        let balanced_n = self.balance_forces(forces_n)?;
         let mut responses: Vec<Response> = bodies
             .par_iter_mut()
             .map(|body| body.load(self, plan, sections, &balanced_n))
@@ -166,7 +166,7 @@ impl VolumeModel {
     }
 
     /// Forces at the wall nodes, plus inertia forces if nothing holds the assembly.
-    pub(super) fn balanced(&self, forces_n: &[Vec3]) -> Result<Vec<Vec3>, SparseError> {
+    pub(super) fn balance_forces(&self, forces_n: &[Vec3]) -> Result<Vec<Vec3>, SparseError> {
         let nodes = &self.wall.nodes;
         let mut loads_n = forces_n.to_vec();
         loads_n.resize(nodes.len(), Vec3::ZERO);
@@ -280,7 +280,7 @@ pub(super) struct Body<'a> {
     /// Labels of the bars' own unknowns, ascending; they come after the wall's.
     own: Vec<u32>,
     /// Wall nodes that the labels number.
-    kept: &'a [u32],
+    seam_nodes: &'a [u32],
     stiffness: Cholesky,
     is_pinned: Vec<bool>,
     /// Unknowns that each contact row acts on, with their weights.
@@ -330,7 +330,7 @@ impl<'a> Body<'a> {
         fronts.extend(model.wall_fronts(part, plan, labels));
         let n = numbering.n + own.len();
         let load_n = vec![0.0; n];
-        let kept = &model.parts[part as usize].kept;
+        let seam_nodes = &model.parts[part as usize].seam_nodes;
         let rows = BTreeMap::new();
         let (is_pinned, moved_mm) = (vec![false; n], Vec::new());
         let stiffness = Cholesky::new(&SparseSymmetric::from_entries(0, Vec::new()))?;
@@ -342,7 +342,7 @@ impl<'a> Body<'a> {
             bars,
             labels,
             own,
-            kept,
+            seam_nodes,
             stiffness,
             is_pinned,
             rows,
@@ -399,7 +399,7 @@ impl<'a> Body<'a> {
             let at = self
                 .numbering
                 .vertices
-                .binary_search(&self.kept[id as usize / 3])
+                .binary_search(&self.seam_nodes[id as usize / 3])
                 .ok()?;
             return self.numbering.first[at].map(|first| first + id % 3);
         }

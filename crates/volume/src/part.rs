@@ -11,8 +11,8 @@ use super::wall::Wall;
 /// Elastic wall of a part as seen by its connectors.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// Wall nodes near the seams, ascending; the unknowns of node `kept[i]` are `3 i .. 3 i + 3`.
-    pub kept: Vec<u32>,
+    /// Wall nodes near the seams, ascending; the unknowns of node `seam_nodes[i]` are `3 i .. 3 i + 3`.
+    pub seam_nodes: Vec<u32>,
     /// Stiffness between the unknowns of the kept nodes, N/mm. If the part is free, springs hold its rigid
     /// motions and act on nothing else, so loads in equilibrium deform it as if they were absent.
     pub stiffness: Front,
@@ -62,7 +62,12 @@ pub(super) struct Numbering {
 }
 
 impl Numbering {
-    pub fn new(order: Order, tets: &[[u32; 4]], kept: &[u32], is_clamped: &impl Fn(u32) -> bool) -> Self {
+    pub fn new(
+        order: Order,
+        tets: &[[u32; 4]],
+        seam_nodes: &[u32],
+        is_clamped: &impl Fn(u32) -> bool,
+    ) -> Self {
         let mut vertices = tets.concat();
         vertices.sort_unstable();
         vertices.dedup();
@@ -70,7 +75,7 @@ impl Numbering {
         if order == Order::Quadratic {
             edges = tets
                 .iter()
-                .flat_map(|t| EDGES.map(|[i, j]| sorted([t[i], t[j]])))
+                .flat_map(|t| EDGES.map(|[i, j]| sort_pair([t[i], t[j]])))
                 .collect();
             edges.sort_unstable();
             edges.dedup();
@@ -82,7 +87,7 @@ impl Numbering {
         };
         let mut first: Vec<Option<u32>> = (vertices.iter())
             .map(|v| {
-                if is_clamped(*v) || kept.binary_search(v).is_ok() {
+                if is_clamped(*v) || seam_nodes.binary_search(v).is_ok() {
                     None
                 } else {
                     next()
@@ -97,7 +102,7 @@ impl Numbering {
             }
         }));
         for (v, first) in vertices.iter().zip(&mut first) {
-            if kept.binary_search(v).is_ok() {
+            if seam_nodes.binary_search(v).is_ok() {
                 *first = next();
             }
         }
@@ -120,7 +125,7 @@ impl Numbering {
         }
         if order == Order::Quadratic {
             for (node, [i, j]) in (4..).zip(EDGES) {
-                let at = self.edges.binary_search(&sorted([tet[i], tet[j]])).ok();
+                let at = self.edges.binary_search(&sort_pair([tet[i], tet[j]])).ok();
                 dofs[node] = at.and_then(|at| self.first[self.vertices.len() + at]);
             }
         }
@@ -128,40 +133,40 @@ impl Numbering {
     }
 }
 
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+fn sort_pair([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
 impl Part {
-    /// Condenses the part made of `tets` onto the nodes `kept` (ascending, none clamped).
+    /// Condenses the part made of `tets` onto the nodes `seam_nodes` (ascending, none clamped).
     pub fn new(
         order: Order,
         material: &Material,
         wall: &Wall,
         tets: &[[u32; 4]],
-        kept: Vec<u32>,
+        seam_nodes: Vec<u32>,
         is_clamped: impl Fn(u32) -> bool,
     ) -> Result<Self, SparseError> {
-        let numbering = Numbering::new(order, tets, &kept, &is_clamped);
-        let points: Vec<Vec3> = kept.iter().map(|v| wall.nodes[*v as usize]).collect();
+        let numbering = Numbering::new(order, tets, &seam_nodes, &is_clamped);
+        let points: Vec<Vec3> = seam_nodes.iter().map(|v| wall.nodes[*v as usize]).collect();
         let is_free = !numbering.vertices.iter().any(|v| is_clamped(*v));
         let rigid = is_free.then(|| RigidModes::new(&points));
-        if kept.is_empty() {
+        if seam_nodes.is_empty() {
             return Ok(Self {
-                kept,
+                seam_nodes,
                 stiffness: Front::default(),
                 rigid,
             });
         }
         let entries = assemble(order, material, wall, tets, &numbering);
         let mut values =
-            SparseSymmetric::from_entries(numbering.n, entries).schur_complement(3 * kept.len())?;
+            SparseSymmetric::from_entries(numbering.n, entries).schur_complement(3 * seam_nodes.len())?;
         if let Some(rigid) = &rigid {
             hold_rigid_motions(&mut values, &points, rigid)?;
         }
-        let ids = (0..3 * kept.len() as u32).collect();
+        let ids = (0..3 * seam_nodes.len() as u32).collect();
         Ok(Self {
-            kept,
+            seam_nodes,
             stiffness: Front { ids, values },
             rigid,
         })

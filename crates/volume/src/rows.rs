@@ -72,7 +72,7 @@ impl VolumeModel {
     pub(super) fn wall_fronts(&self, part: u32, plan: &[Meeting], labels: Labels) -> Vec<Front> {
         let sides = self.sides_of_part(part);
         let front = |(station, side): (usize, Side)| {
-            let kept = self.faces(station, side).map(|node| self.place_kept[node]);
+            let kept = self.faces(station, side).map(|node| self.kept_index[node]);
             let row = labels.row(station, WALL);
             let half = off_the_wall(&plan[station], side).to_array().map(|x| 0.5 * x);
             let mut couplings: Vec<(u32, f64)> = (kept.into_iter().flatten())

@@ -6,7 +6,7 @@ use super::*;
 const SIZE_MM: f64 = 3.0;
 
 /// Joins every station; friction holds part `fast`.
-fn joined(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meeting> {
+fn join(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meeting> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let joint = |s: &Station| {
         let leaves = s.normal * cos + s.across * sin;
@@ -36,7 +36,7 @@ fn plates_on_a_straight_seam_come_apart() {
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     for degrees in [-90.0, -45.0, 0.0, 45.0] {
         assert_eq!(
-            model.resist(&joined(&plates, degrees, None), 0).unwrap(),
+            model.resist(&join(&plates, degrees, None), 0).unwrap(),
             Resistance::Separable(vec![1])
         );
     }
@@ -49,7 +49,7 @@ fn walls_block_what_pins_leave_free_each_in_one_direction() {
     let plates = sample::plates(30.0, 15.0, [6, 3]);
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     let with_walls = |walls: [Vec3; 5]| {
-        let mut plan = joined(&plates, 0.0, None);
+        let mut plan = join(&plates, 0.0, None);
         plan.iter_mut()
             .zip(walls)
             .for_each(|(meeting, wall)| meeting.wall = wall);
@@ -94,9 +94,9 @@ fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
         .filter(|(_, p)| p.x.abs() > 19.9)
         .map(|(i, _)| i)
         .collect();
-    let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
+    let model = VolumeModel::with_clamp(&VolumeParams::default(), &plates, &clamped).unwrap();
     let opening = |wall: Vec3| {
-        let mut plan = joined(&plates, 0.0, None);
+        let mut plan = join(&plates, 0.0, None);
         plan.iter_mut().for_each(|meeting| meeting.wall = wall);
         let moved = model.equilibrium(&plan, None).unwrap().unwrap().displacement_mm;
         moved
@@ -120,10 +120,10 @@ fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
     let ball = sample::ball(20.0, 4);
     let sliding = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     assert_eq!(
-        sliding.resist(&joined(&ball, 0.0, None), 7).unwrap(),
+        sliding.resist(&join(&ball, 0.0, None), 7).unwrap(),
         Resistance::Separable((0..7).collect())
     );
-    let sticking = sliding.resist(&joined(&ball, 0.0, Some(7)), 7).unwrap();
+    let sticking = sliding.resist(&join(&ball, 0.0, Some(7)), 7).unwrap();
     let Resistance::Holds(opening) = sticking else {
         panic!("it comes apart")
     };
@@ -138,7 +138,7 @@ fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
 fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move_at_all() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let plan = joined(&ball, -30.0, Some(7));
+    let plan = join(&ball, -30.0, Some(7));
     let moved = model
         .equilibrium(&plan, Some(7))
         .unwrap()
@@ -179,7 +179,7 @@ fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move
 fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let plan = joined(&ball, -30.0, Some(7));
+    let plan = join(&ball, -30.0, Some(7));
     let moved = model
         .equilibrium(&plan, Some(7))
         .unwrap()
@@ -204,7 +204,7 @@ fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
 fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let plan = joined(&ball, 20.0, None);
+    let plan = join(&ball, 20.0, None);
     let (labels, part) = (model.labels(3), &model.parts[3]);
     let (fronts, sides) = (model.wall_fronts(3, &plan, labels), model.sides_of_part(3));
     let rigid = part.rigid.unwrap();
@@ -217,7 +217,7 @@ fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
         let along = super::rows::off_the_wall(&plan[station], side);
         for motion in 0..6 {
             let at_node = |id: u32| {
-                let node = part.kept[id as usize / 3] as usize;
+                let node = part.seam_nodes[id as usize / 3] as usize;
                 rigid.at(model.wall.nodes[node])[motion].to_array()[id as usize % 3]
             };
             let seen: f64 = (0..n - 1)
@@ -253,7 +253,10 @@ fn strip(order: Order, clamp: bool) -> (VolumeModel, ShellAssembly) {
         material,
         ..VolumeParams::default()
     };
-    (VolumeModel::clamped(&params, &plates, &clamped).unwrap(), plates)
+    (
+        VolumeModel::with_clamp(&params, &plates, &clamped).unwrap(),
+        plates,
+    )
 }
 
 /// Deflection of a strip's tip, mm, under 1 N spread over its end face; and the value by beam theory.
@@ -266,13 +269,13 @@ fn tip_deflection(order: Order) -> (f64, f64) {
         ids: (0..=n as u32).collect(),
         values: vec![0.0; (n + 1) * (n + 1)],
     };
-    let end: Vec<usize> = (0..part.kept.len())
-        .filter(|i| model.wall.nodes[part.kept[*i] as usize].x > -1e-9)
+    let end: Vec<usize> = (0..part.seam_nodes.len())
+        .filter(|i| model.wall.nodes[part.seam_nodes[*i] as usize].x > -1e-9)
         .collect();
     for &i in &end {
         loaded.values[n + (n + 1) * (3 * i + 2)] = 1.0 / end.len() as f64;
     }
-    let left = Front::condensed(&[&part.stiffness, &loaded], |id| id < n as u32).unwrap();
+    let left = Front::condense(&[&part.stiffness, &loaded], |id| id < n as u32).unwrap();
     let (force, length, width, depth, e) = (1.0, 40.0_f64, 5.0, 2.0_f64, 2000.0);
     (
         -left.values[0],
@@ -346,7 +349,7 @@ fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_sha
     let params = VolumeParams::default();
     let model = VolumeModel::new(&params, &ball).unwrap();
     for degrees in [-90.0, -30.0, 0.0, 45.0] {
-        for [a, b] in super::bars::sections(&model, &joined(&ball, degrees, None))
+        for [a, b] in super::bars::sections(&model, &join(&ball, degrees, None))
             .iter()
             .zip(&ball.stations)
             .map(|(sides, station)| {
@@ -395,7 +398,7 @@ fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
             .sum();
         moved / one
     };
-    let at = |node: usize| rigid.at(model.wall.nodes[part.kept[node] as usize]);
+    let at = |node: usize| rigid.at(model.wall.nodes[part.seam_nodes[node] as usize]);
     for m in 0..6 {
         let u: Vec<f64> = (0..n / 3).flat_map(|i| at(i)[m].to_array()).collect();
         for row in 0..n {
@@ -442,7 +445,7 @@ fn where_no_wall_fits_it_is_thinner_and_sound() {
 fn quality(params: &VolumeParams, degrees: f64) -> f64 {
     let ball = sample::ball(15.0, 4);
     let model = VolumeModel::new(params, &ball).unwrap();
-    match model.resist(&joined(&ball, degrees, Some(7)), 7).unwrap() {
+    match model.resist(&join(&ball, degrees, Some(7)), 7).unwrap() {
         Resistance::Holds(opening) => opening.quality_mm,
         Resistance::Separable(parts) => panic!("{parts:?} come off"),
     }
@@ -546,7 +549,7 @@ fn odd_input_is_refused() {
 fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() {
     let ball = sample::ball(20.0, 6);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let mut plan = joined(&ball, 0.0, None);
+    let mut plan = join(&ball, 0.0, None);
     for (i, meeting) in plan.iter_mut().enumerate() {
         meeting.joint = meeting.joint.filter(|_| i % 5 != 0);
         if let Some(joint) = meeting.joint.as_mut().filter(|_| i % 3 == 0) {
@@ -571,7 +574,7 @@ fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() 
 fn a_joint_that_stands_alone_holds_no_octant() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let mut plan = joined(&ball, 0.0, None);
+    let mut plan = join(&ball, 0.0, None);
     let alone = ball.steps[0][0] as usize;
     plan.iter_mut()
         .enumerate()
@@ -583,7 +586,7 @@ fn a_joint_that_stands_alone_holds_no_octant() {
 #[test]
 fn pins_that_slide_out_of_their_channels_do_not_hold() {
     let ball = sample::ball(20.0, 4);
-    let plan = joined(&ball, -0.7, Some(7));
+    let plan = join(&ball, -0.7, Some(7));
     let at = |force_n_per_mm| {
         VolumeModel::new(
             &VolumeParams {
@@ -620,16 +623,16 @@ fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
 }
 
 /// Ball pressed on its top with `force_n`, with its bottom held if `is_held`.
-fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
+fn press(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
     let ball = sample::ball(20.0, 4);
     let params = VolumeParams::default();
     let held = if is_held { beyond(&ball, -17.0) } else { Vec::new() };
-    let model = VolumeModel::clamped(&params, &ball, &held).unwrap();
+    let model = VolumeModel::with_clamp(&params, &ball, &held).unwrap();
     let top = beyond(&ball, 17.0);
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
     top.iter()
         .for_each(|&p| forces_n[p as usize] = -Vec3::Z * force_n / top.len() as f64);
-    let mut plan = joined(&ball, -30.0, Some(7));
+    let mut plan = join(&ball, -30.0, Some(7));
     plan.iter_mut()
         .filter_map(|m| m.joint.as_mut())
         .for_each(|joint| joint.size_mm = connector_mm);
@@ -638,7 +641,7 @@ fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
 
 #[test]
 fn forces_on_every_part_of_a_pressed_ball_balance_and_all_grows_with_the_force() {
-    let (once, twice) = (pressed(10.0, 3.0, true), pressed(20.0, 3.0, true));
+    let (once, twice) = (press(10.0, 3.0, true), press(20.0, 3.0, true));
     assert!(once.imbalance < 1e-6 && once.lost.is_empty(), "{once:?}");
     let widest = |l: &Loaded| l.opening_mm.iter().copied().fold(0.0, f64::max);
     assert!((widest(&twice) / widest(&once) - 2.0).abs() < 1e-5);
@@ -649,7 +652,7 @@ fn forces_on_every_part_of_a_pressed_ball_balance_and_all_grows_with_the_force()
 
 #[test]
 fn smaller_connectors_open_wider_and_are_stressed_more() {
-    let (whole, half) = (pressed(10.0, 3.0, true), pressed(10.0, 1.5, true));
+    let (whole, half) = (press(10.0, 3.0, true), press(10.0, 1.5, true));
     let widest = |l: &Loaded| l.opening_mm.iter().copied().fold(0.0, f64::max);
     assert!(
         widest(&half) > widest(&whole),
@@ -662,7 +665,7 @@ fn smaller_connectors_open_wider_and_are_stressed_more() {
 
 #[test]
 fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
-    let struck = pressed(10.0, 3.0, false);
+    let struck = press(10.0, 3.0, false);
     assert!(
         struck.imbalance < 1e-6 && struck.lost.is_empty(),
         "{}",
@@ -673,7 +676,7 @@ fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
     forces_n[5] = Vec3::new(1.0, -2.0, 3.0);
-    let loads_n = model.balanced(&forces_n).unwrap();
+    let loads_n = model.balance_forces(&forces_n).unwrap();
     let torque: Vec3 = loads_n
         .iter()
         .zip(&model.wall().nodes)
@@ -744,8 +747,8 @@ fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
         .filter(|(_, p)| p.x.abs() > 9.9)
         .map(|(i, _)| i)
         .collect();
-    let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
-    let plan = joined(&plates, 20.0, None);
+    let model = VolumeModel::with_clamp(&VolumeParams::default(), &plates, &clamped).unwrap();
+    let plan = join(&plates, 20.0, None);
     let sections = super::bars::sections(&model, &plan);
     let bars = super::bars::bars(&model, &plan, &sections);
     let loads_n = vec![Vec3::ZERO; model.wall.nodes.len()];
@@ -770,7 +773,7 @@ fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
 fn forces_that_are_none_are_refused() {
     let plates = sample::plates(10.0, 5.0, [4, 2]);
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
-    let plan = joined(&plates, 0.0, None);
+    let plan = join(&plates, 0.0, None);
     let n = plates.points.len();
     assert_eq!(
         model.under_load(&plan, &[]),

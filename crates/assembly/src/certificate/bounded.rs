@@ -40,7 +40,7 @@ pub struct Bounded {
 }
 
 /// Bearings that a kit's proofs use, each once, and the proofs.
-pub(super) fn bounded(play: &KitPlay) -> (Vec<BearingPoint>, Vec<Bounded>) {
+pub(super) fn list_bounds(play: &KitPlay) -> (Vec<BearingPoint>, Vec<Bounded>) {
     let mut place: BTreeMap<usize, usize> = BTreeMap::new();
     for (bearing, _) in play.proofs.iter().flat_map(|proof| &proof.rows) {
         place.entry(*bearing).or_default();

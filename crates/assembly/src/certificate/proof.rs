@@ -54,7 +54,7 @@ const SINGULAR: f64 = 1e-13;
 const CORRECTIONS: usize = 4;
 
 /// Multipliers which prove that contacts allow no motion.
-pub(super) struct Proof {
+pub(super) struct LockProof {
     /// Contacts with their multipliers, all positive; in the order of the contacts.
     pub multipliers: Vec<(usize, f64)>,
     /// Residual of the equilibrium, `|Aᵀμ|`.
@@ -69,7 +69,7 @@ pub(super) struct Question<'a> {
     /// Number of all pieces.
     pub n_pieces: usize,
     /// Pieces that do not move.
-    pub held: &'a [PatchId],
+    pub at_rest: &'a [PatchId],
     /// Piece that may move freely, along this direction at least: nothing is claimed of it.
     pub leaves: Option<(PatchId, Vec3)>,
     /// Distance from the origin, which twists are about, at which spins count as velocities, mm.
@@ -78,10 +78,10 @@ pub(super) struct Question<'a> {
 }
 
 /// Proves that no piece moves except the one that may leave; `None` if there is no proof.
-pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Proof> {
+pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<LockProof> {
     let Question {
         n_pieces,
-        held,
+        at_rest: held,
         leaves,
         length_mm,
         freedom,
@@ -93,7 +93,7 @@ pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Pro
     let system = System::new(contacts, &free, length_mm, freedom);
     let leaving = leaves.and_then(|(piece, way)| Some((free.binary_search(&piece).ok()?, way)));
     if free.len() == usize::from(leaving.is_some()) {
-        return Some(Proof {
+        return Some(LockProof {
             multipliers: Vec::new(),
             residual: 0.0,
             hold: 1.0,
@@ -117,7 +117,7 @@ pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Pro
     let named = multipliers
         .into_iter()
         .map(|(row, value)| (system.rows[row].contact, value));
-    (residual < hold && hold > LEAST_HOLD).then(|| Proof {
+    (residual < hold && hold > LEAST_HOLD).then(|| LockProof {
         multipliers: named.collect(),
         residual,
         hold,

@@ -12,7 +12,7 @@ use crate::LatticeDirection;
 use crate::motion::free_motion;
 use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, brick, grown, pinned_kit, pinned_lid};
 
-fn certified(kit: &Kit) -> Certificate {
+fn make_certificate(kit: &Kit) -> Certificate {
     let file = |id: PatchId| PieceFile {
         id,
         file: format!("{id}.stl"),
@@ -20,7 +20,7 @@ fn certified(kit: &Kit) -> Certificate {
         play: None,
     };
     let files = kit.pieces.ids().map(file).collect();
-    let (verdict, contacts) = kit.examined();
+    let (verdict, contacts) = kit.examine();
     let evidence = Evidence {
         contacts: &contacts,
         verdict: &verdict,
@@ -36,7 +36,7 @@ fn movers(kit: &Kit) -> Vec<u32> {
         Finding::ClusterMoves { motions } => Some(motions.iter().map(|m| m.piece.0).collect()),
         _ => None,
     });
-    let is_claimed = matches!(&certified(kit).claims[0], Claim::Locked { .. });
+    let is_claimed = matches!(&make_certificate(kit).claims[0], Claim::Locked { .. });
     assert_eq!(is_claimed, moving.is_none());
     moving.unwrap_or_default()
 }
@@ -55,7 +55,7 @@ fn contact(a: u32, b: u32, point: Vec3, normal: Vec3) -> Contact {
 fn question(n_pieces: usize, length_mm: f64, freedom: Freedom) -> Question<'static> {
     Question {
         n_pieces,
-        held: &[PatchId(0)],
+        at_rest: &[PatchId(0)],
         leaves: None,
         length_mm,
         freedom,
@@ -68,7 +68,7 @@ fn is_locked(contacts: &[Contact], n_pieces: usize, freedom: Freedom) -> bool {
 
 #[test]
 fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
-    let certificate = certified(&pinned_kit(|_| {}));
+    let certificate = make_certificate(&pinned_kit(|_| {}));
     let Claim::Locked {
         held,
         leaves,
@@ -191,7 +191,7 @@ fn blocks_in_a_straight_groove_are_not_certified() {
 fn a_path_that_rubs_is_not_claimed() {
     let mut kit = pinned_kit(|_| {});
     let installs = |kit: &Kit| {
-        let claims = certified(kit).claims.into_iter();
+        let claims = make_certificate(kit).claims.into_iter();
         let piece = |claim| {
             if let Claim::Installs { piece, .. } = claim {
                 Some(piece.0)

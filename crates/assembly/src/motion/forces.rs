@@ -31,7 +31,7 @@ impl System {
             if rest.lp_norm(1) <= enough {
                 break;
             }
-            let Some(entering) = self.most_violated(&rest, &is_refused) else {
+            let Some(entering) = self.worst_violation(&rest, &is_refused) else {
                 break;
             };
             if !active.push(self, entering) {
@@ -57,7 +57,7 @@ impl System {
     }
 
     /// Row along which `−rest` violates its contact most, relative to the row's length.
-    fn most_violated(&self, rest: &DVector<f64>, is_refused: &[bool]) -> Option<usize> {
+    fn worst_violation(&self, rest: &DVector<f64>, is_refused: &[bool]) -> Option<usize> {
         let limit = -VIOLATION * rest.norm();
         let violation = |row: &Row| self.dot(row, rest) / self.dot_rows(row, row).sqrt();
         let open = self.rows.iter().enumerate().filter(|(i, _)| !is_refused[*i]);

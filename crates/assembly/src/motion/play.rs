@@ -106,7 +106,7 @@ impl<'a> Limits<'a> {
             wrench: row.wrench,
             plus: row.plus.unwrap_or(n),
             minus: row.minus.unwrap_or(n),
-            bound_mm: gap_mm + WIDENED_MM * scattered(i),
+            bound_mm: gap_mm + WIDENED_MM * scatter(i),
         };
         let side = |i: usize| {
             let sign = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -129,7 +129,7 @@ impl<'a> Limits<'a> {
 }
 
 /// Number in [0.5, 1) for each `i`, irregularly distributed: the fractions of multiples of the golden ratio.
-fn scattered(i: usize) -> f64 {
+fn scatter(i: usize) -> f64 {
     0.5 + 0.5 * ((i + 1) as f64 * 0.618_033_988_749_894_9).fract()
 }
 
@@ -156,23 +156,24 @@ impl<'a> Corner<'a> {
 
     /// Greatest `objective · x`; `None` if it is unlimited.
     pub fn farthest(&mut self, objective: &DVector<f64>) -> Option<f64> {
-        self.ended(objective).map(|_| dot(objective.as_slice(), &self.x))
+        self.maximise(objective)
+            .map(|_| dot(objective.as_slice(), &self.x))
     }
 
     /// Rows with the forces that prove the greatest `objective · x`: they add up to the objective, except for
     /// rounding. `None` if it is unlimited.
-    pub fn ended(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
+    pub fn maximise(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.go_farthest(objective.as_slice());
-        self.ending(objective)
+        self.corner_forces(objective)
     }
 
-    /// Like [`Corner::ended`], but only with rows that were examined before: the bound is no tighter, and
+    /// Like [`Corner::maximise`], but only with rows that were examined before: the bound is no tighter, and
     /// faster to find.
-    pub fn ended_by_known(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
+    pub fn maximise_from_cache(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.climb(objective.as_slice());
         self.come_back(objective.as_slice());
         self.climb(objective.as_slice());
-        self.ending(objective)
+        self.corner_forces(objective)
     }
 
     /// Rows that have been examined.
@@ -189,7 +190,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Rows with forces in the corner that was found for an objective.
-    fn ending(&self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
+    fn corner_forces(&self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         let forces = self.forces(objective.as_slice());
         let least = STRENGTHENED * objective.norm();
         let pushing = || self.active.iter().copied().zip(forces.iter().copied());
@@ -211,7 +212,7 @@ impl<'a> Corner<'a> {
 
     /// Moves from a corner that all examined limits allow to the farthest such corner.
     fn climb(&mut self, objective: &[f64]) {
-        while let Some(leaving) = self.most_pulling(&self.forces(objective)) {
+        while let Some(leaving) = self.steepest_limit(&self.forces(objective)) {
             let way: Vec<f64> = self.edges[leaving].iter().map(|x| -x).collect();
             let Some(entering) = self.first_met(&way) else {
                 break;
@@ -226,10 +227,10 @@ impl<'a> Corner<'a> {
         let mut objective = objective.to_vec();
         let more = STRENGTHENED * dot(&objective, &objective).sqrt();
         for (i, &limit) in self.active.iter().enumerate() {
-            self.add_row(limit, more * scattered(i), &mut objective);
+            self.add_row(limit, more * scatter(i), &mut objective);
         }
         while let Some(entering) = self.most_overdrawn() {
-            let Some(leaving) = self.first_relieved(&self.forces(&objective), entering) else {
+            let Some(leaving) = self.first_release(&self.forces(&objective), entering) else {
                 break;
             };
             self.exchange(leaving, entering);
@@ -242,7 +243,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Index of the limit along whose edge the objective rises most steeply.
-    fn most_pulling(&self, forces: &[f64]) -> Option<usize> {
+    fn steepest_limit(&self, forces: &[f64]) -> Option<usize> {
         let least = -FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
         let pulling = (0..forces.len()).filter(|&i| forces[i] < least);
         let steepness = |i: usize| forces[i].powi(2) / dot(&self.edges[i], &self.edges[i]);
@@ -284,7 +285,7 @@ impl<'a> Corner<'a> {
     }
 
     /// Index of the limit that loses its force first as `entering` begins to push.
-    fn first_relieved(&self, forces: &[f64], entering: usize) -> Option<usize> {
+    fn first_release(&self, forces: &[f64], entering: usize) -> Option<usize> {
         let shares = self.shares(entering);
         let least = FLAT * shares.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
         let relieved: Vec<usize> = (0..shares.len()).filter(|&i| shares[i] > least).collect();
@@ -402,7 +403,7 @@ impl<'a> Corner<'a> {
     /// Computes the late bound of the row.
     fn settle(&mut self, row: usize) {
         if let Some(late) = self.limits.late.filter(|_| !self.is_settled[row]) {
-            self.bounds_mm[row] = late(row) + WIDENED_MM * scattered(row);
+            self.bounds_mm[row] = late(row) + WIDENED_MM * scatter(row);
             self.is_settled[row] = true;
         }
     }

@@ -84,7 +84,7 @@ pub(super) struct Answer {
     /// rad. Empty if several pieces are free.
     pub swings: Vec<[f64; 6]>,
     /// Bearings that hold, of those whose barrier was computed in any round.
-    pub asked: BTreeSet<usize>,
+    pub bearings: BTreeSet<usize>,
     /// Proof, or the reason why there is none.
     pub proof: Result<Proof, Open>,
 }
@@ -101,7 +101,11 @@ impl Answer {
             ..proof
         });
         Self {
-            asked: self.asked.into_iter().map(|bearing| n_before + bearing).collect(),
+            bearings: self
+                .bearings
+                .into_iter()
+                .map(|bearing| n_before + bearing)
+                .collect(),
             proof,
             ..self
         }
@@ -179,9 +183,9 @@ impl Problem<'_> {
         let quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
         let round = Round::new(self, &bearings, &quantities, &beds);
-        round
-            .ends()
-            .map_or_else(Vec::new, |found| quantities.linear(&round.found(&found.ends)))
+        round.ends().map_or_else(Vec::new, |found| {
+            quantities.linear(&round.collect_bounds(&found.ends))
+        })
     }
 
     /// Searches for the proof. The answer depends on the question alone, on any number of threads.
@@ -193,7 +197,7 @@ impl Problem<'_> {
         let mut answer = Answer {
             linear: Vec::new(),
             swings: Vec::new(),
-            asked: BTreeSet::new(),
+            bearings: BTreeSet::new(),
             proof: Err(Open::Rounds),
         };
         let open = |answer: Answer, why: Open| {
@@ -209,7 +213,7 @@ impl Problem<'_> {
                 return open(answer, Open::Far);
             };
             let guesses = round.guesses(&ends, &motions);
-            let found = round.found(&ends);
+            let found = round.collect_bounds(&ends);
             let is_within = |(&q, found): (&usize, &Vec<[f64; 2]>)| {
                 found
                     .iter()
@@ -220,7 +224,7 @@ impl Problem<'_> {
                 answer.linear = quantities.linear(&found);
                 answer.swings = self.swings(&motions);
             }
-            answer.asked.extend(round.holding().map(|i| own[i]));
+            answer.bearings.extend(round.bearings_that_hold().map(|i| own[i]));
             if found.iter().all(is_within) {
                 let proof = Ok(round.proof(&own, ends, found));
                 return Ok(Answer { proof, ..answer });
@@ -267,7 +271,7 @@ struct Round<'a> {
     system: System,
     errors_mm: Vec<f64>,
     /// Bounds of rows, computed on demand.
-    told: Vec<OnceLock<f64>>,
+    bounds: Vec<OnceLock<f64>>,
 }
 
 impl<'a> Round<'a> {
@@ -316,7 +320,7 @@ impl<'a> Round<'a> {
             center,
             system,
             errors_mm,
-            told,
+            bounds: told,
         }
     }
 
@@ -353,14 +357,14 @@ impl<'a> Round<'a> {
 
     /// Bound of a row, mm: the height that its bearing's point can reach, plus the error.
     fn bound_mm(&self, row: usize) -> f64 {
-        *self.told[row].get_or_init(|| self.measured_mm(row))
+        *self.bounds[row].get_or_init(|| self.measured_mm(row))
     }
 
     /// Bearings whose barrier was computed and that hold.
-    fn holding(&self) -> impl Iterator<Item = usize> + '_ {
-        let is_held = |row: &usize| self.told[*row].get().is_some_and(|mm| mm.is_finite());
+    fn bearings_that_hold(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_held = |row: &usize| self.bounds[*row].get().is_some_and(|mm| mm.is_finite());
         let contact = |row: usize| self.system.rows[row].contact;
-        (0..self.told.len())
+        (0..self.bounds.len())
             .filter(is_held)
             .map(contact)
             .filter(|&i| i < self.bearings.len())
@@ -405,9 +409,9 @@ impl<'a> Round<'a> {
                     .map(|(q, way)| (self.objective(q, way / 2, way % 2), self.is_of_piece(q)))
                     .map(|(towards, is_of_piece)| {
                         let rows = if is_of_piece {
-                            corner.ended(&towards)
+                            corner.maximise(&towards)
                         } else {
-                            corner.ended_by_known(&towards)
+                            corner.maximise_from_cache(&towards)
                         };
                         (rows, DVector::from_column_slice(corner.motion()))
                     })
@@ -494,7 +498,7 @@ impl<'a> Round<'a> {
     }
 
     /// Bounds of each quantity, against each axis and along it.
-    fn found(&self, ends: &BTreeMap<usize, Ends>) -> BTreeMap<usize, Vec<[f64; 2]>> {
+    fn collect_bounds(&self, ends: &BTreeMap<usize, Ends>) -> BTreeMap<usize, Vec<[f64; 2]>> {
         ends.iter()
             .map(|(&q, ends)| (q, ends.iter().map(|e| self.values(q, e)).collect()))
             .collect()
@@ -602,7 +606,7 @@ impl<'a> Round<'a> {
         let mut corner = Corner::new(&limits);
         for q in self.quantities.of_piece.values().flatten() {
             for line in other_lines() {
-                let sides = [-line, line].map(|d| corner.ended(&self.along(*q, d)));
+                let sides = [-line, line].map(|d| corner.maximise(&self.along(*q, d)));
                 if sides.iter().any(Option::is_none) {
                     continue;
                 }

@@ -10,7 +10,7 @@ use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, brick, pinned_kit};
 
 const CLEARANCE_MM: f64 = 2.0 * HALF_GAP_MM;
 
-fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
+fn measure_kit(kit: &Kit, clearance_mm: f64) -> KitPlay {
     let params = PlayParams {
         clearance_mm,
         slide_mm: SLIDE_MM,
@@ -24,7 +24,7 @@ fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
 }
 
 /// A cube of 10 mm in a closed cage with a gap all round; the key is elsewhere.
-fn caged(gap_mm: f64) -> Kit {
+fn cage(gap_mm: f64) -> Kit {
     let hollow = [10.0 - gap_mm, 20.0 + gap_mm];
     let cage = brick(ALL, ALL, ALL).subtract(&brick(hollow, hollow, hollow));
     let inside = [10.0, 20.0];
@@ -77,7 +77,7 @@ fn a_way_out_is_sought_from_the_same_points_however_they_are_numbered() {
 
 #[test]
 fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
-    let play = measured(&caged(0.1), 0.1);
+    let play = measure_kit(&cage(0.1), 0.1);
     let Some(cube) = play.alone[PatchId(1)].filter(|p| p.is_proven) else {
         panic!("{:?}", play.alone)
     };
@@ -97,11 +97,11 @@ fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
 
 #[test]
 fn faces_that_stand_back_are_a_wider_gap() {
-    let (narrow, wide) = (caged(0.1), caged(0.2));
-    let play = measured(&narrow, 0.2);
+    let (narrow, wide) = (cage(0.1), cage(0.2));
+    let play = measure_kit(&narrow, 0.2);
     let thin = printed_thin(&Ctx::quiet(), &narrow.pieces, &play, 0.05).unwrap();
     let cube = |plays: &IdVec<PatchId, Option<Play>>| plays[PatchId(1)].unwrap();
-    let (thin, wide) = (cube(&thin), cube(&measured(&wide, 0.2).estimates));
+    let (thin, wide) = (cube(&thin), cube(&measure_kit(&wide, 0.2).estimates));
     assert!(
         (thin.translation_mm - wide.translation_mm).abs() < 0.02,
         "{thin:?} {wide:?}"
@@ -115,7 +115,7 @@ fn faces_that_stand_back_are_a_wider_gap() {
 #[test]
 fn no_free_walk_leads_beyond_the_proven_play() {
     let kit = pinned_kit(|_| {});
-    let play = measured(&kit, CLEARANCE_MM);
+    let play = measure_kit(&kit, CLEARANCE_MM);
     let Some(lid) = play.alone[PatchId(1)].filter(|p| p.is_proven) else {
         panic!("{:?}", play.alone)
     };
@@ -170,7 +170,7 @@ fn the_play_of_all_together_is_no_less_than_that_of_each_alone() {
         brick(inside, inside, inside),
         brick(shaft, shaft, [10.0, 30.0]),
     ];
-    let play = measured(
+    let play = measure_kit(
         &Kit::new(brick(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z]),
         0.1,
     );
@@ -204,7 +204,7 @@ fn what_nothing_holds_is_found_to_come_out() {
         brick([40.0, 41.0], ALL, ALL),
     ];
     let kit = Kit::new(brick(ALL, ALL, ALL), &pieces, &[Vec3::X; 3]);
-    let play = measured(&kit, 0.1);
+    let play = measure_kit(&kit, 0.1);
     assert!(
         !play.alone[PatchId(1)].is_some_and(|p| p.is_proven),
         "{:?}",
@@ -233,14 +233,14 @@ fn what_nothing_holds_is_found_to_come_out() {
 
 #[test]
 fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not() {
-    let held = measured(&under_lips(3.0, 0.12), 0.12);
+    let held = measure_kit(&under_lips(3.0, 0.12), 0.12);
     assert!(
         held.alone[PatchId(1)].is_some_and(|p| p.is_proven) && held.ways_out == Some(Vec::new()),
         "{:?}",
         held.alone
     );
     // Shifted under one lip by 0.4 mm, the plate is free of the other, which reaches over it by 0.3.
-    let loose = measured(&under_lips(0.3, 0.4), 0.4);
+    let loose = measure_kit(&under_lips(0.3, 0.4), 0.4);
     assert!(
         !loose.alone[PatchId(1)].is_some_and(|p| p.is_proven),
         "{:?}",
@@ -259,7 +259,7 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
         &[cabinet, drawer, key.clone()],
         &[Vec3::X; 3],
     );
-    let play = measured(&kit, 0.1);
+    let play = measure_kit(&kit, 0.1);
     assert!(
         play.ways_out.iter().flatten().any(|way| way.0 == PatchId(1)),
         "{:?}",
@@ -277,7 +277,7 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
             .subtract(&ball(8.15))
             .subtract(&brick([14.0, 16.0], [14.0, 16.0], [15.0, 40.0]));
     let kit = Kit::new(brick(ALL, ALL, ALL), &[socket, ball(8.0), key], &[Vec3::X; 3]);
-    let play = measured(&kit, 0.1);
+    let play = measure_kit(&kit, 0.1);
     assert!(play.unproven().any(|id| id == PatchId(1)));
     assert_eq!(play.ways_out, Some(Vec::new()));
 }
@@ -294,7 +294,7 @@ fn a_speck_is_no_bearing() {
         &[cage, cube, brick([40.0, 41.0], ALL, ALL)],
         &[Vec3::X; 3],
     );
-    let play = measured(&kit, 0.1);
+    let play = measure_kit(&kit, 0.1);
     assert!(
         play.proofs.iter().all(|proof| proof.free != [PatchId(1)]),
         "{:?}",
@@ -307,7 +307,7 @@ fn play_is_the_same_on_one_thread_and_on_two() {
     let kit = pinned_kit(|_| {});
     let on = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-        pool.install(|| format!("{:?}", measured(&kit, CLEARANCE_MM)))
+        pool.install(|| format!("{:?}", measure_kit(&kit, CLEARANCE_MM)))
     };
     assert!(on(1) == on(2));
 }

@@ -98,7 +98,7 @@ impl Pose {
     }
 
     /// Displacement of the centre, mm, and rotation vector, rad.
-    fn written(&self) -> [f64; 6] {
+    fn coordinates(&self) -> [f64; 6] {
         let (s, w) = (self.shift.to_array(), self.turn.to_scaled_axis().to_array());
         [s[0], s[1], s[2], w[0], w[1], w[2]]
     }
@@ -168,13 +168,13 @@ impl<'a> Walk<'a> {
                 .into_iter()
                 .map(|s| s.point);
             // Corners are the first to meet other pieces.
-            let points = thinned(as_met(mesh)).into_iter().chain(samples);
+            let points = thin(as_met(mesh)).into_iter().chain(samples);
             let is_near = |p: &Vec3| surfaces.nearest(*p, JOINT_MM, b).is_some();
             points.filter(is_near).collect()
         };
-        let own = thinned(beside(piece, &|b| b != piece));
+        let own = thin(beside(piece, &|b| b != piece));
         let ids: Vec<PatchId> = surfaces.ids().filter(|&b| b != piece).collect();
-        let others = thinned(ids.iter().flat_map(|&b| beside(b, &|a| a == piece)).collect());
+        let others = thin(ids.iter().flat_map(|&b| beside(b, &|a| a == piece)).collect());
         Self {
             surfaces,
             piece,
@@ -210,7 +210,7 @@ impl<'a> Walk<'a> {
                 if let Some(poses) = self.walk(ctx, vec![Pose::REST], heading)?
                     && self.is_free(ctx, &poses, pieces)?
                 {
-                    return Ok(Some(kept(&poses)));
+                    return Ok(Some(thin_poses(&poses)));
                 }
             }
         }
@@ -257,7 +257,7 @@ impl<'a> Walk<'a> {
                 )
             };
             for _ in 0..MOST_ON {
-                let Some(next) = self.moved(&tree.nodes[last].0, heading) else {
+                let Some(next) = self.advance(&tree.nodes[last].0, heading) else {
                     break;
                 };
                 let moved_mm = self.moved_mm(&next);
@@ -268,7 +268,7 @@ impl<'a> Walk<'a> {
                     if let Some(poses) = poses
                         && self.is_free(ctx, &poses, pieces)?
                     {
-                        return Ok(Some(kept(&poses)));
+                        return Ok(Some(thin_poses(&poses)));
                     }
                 }
             }
@@ -280,7 +280,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Pose after one step, or `None` without progress.
-    fn moved(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<Pose> {
+    fn advance(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<Pose> {
         let (shift, spin) = self.step(pose, heading)?;
         let turn = Quat::from_scaled_axis(spin);
         Some(Pose {
@@ -302,7 +302,7 @@ impl<'a> Walk<'a> {
         for _ in 0..MOST_STEPS {
             ctx.check()?;
             let towards = self.with_chance(heading, CHANCE[usize::from(n_stuck > 0)], &mut rng);
-            let Some(next) = self.moved(&pose, towards) else {
+            let Some(next) = self.advance(&pose, towards) else {
                 n_stuck += 1;
                 if n_stuck > MOST_STUCK {
                     return Ok(None);
@@ -516,13 +516,13 @@ impl<'a> Walk<'a> {
 }
 
 /// Subset of the poses, including the last, each as displacement and rotation vector.
-fn kept(poses: &[Pose]) -> Vec<[f64; 6]> {
+fn thin_poses(poses: &[Pose]) -> Vec<[f64; 6]> {
     let every = poses.len().div_ceil(KEPT_POSES).max(1);
     poses
         .iter()
         .step_by(every)
         .chain(poses.last())
-        .map(Pose::written)
+        .map(Pose::coordinates)
         .collect()
 }
 
@@ -575,7 +575,7 @@ pub(super) fn as_met(mesh: &TriMesh) -> Vec<Vec3> {
 }
 
 /// Keeps every k-th point if there are too many.
-fn thinned(points: Vec<Vec3>) -> Vec<Vec3> {
+fn thin(points: Vec<Vec3>) -> Vec<Vec3> {
     let every = points.len().div_ceil(MOST_POINTS).max(1);
     points.into_iter().step_by(every).collect()
 }

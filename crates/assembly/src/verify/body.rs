@@ -28,7 +28,7 @@ struct EdgeUse {
     /// Number of edges used more often in one direction than in the other.
     n_unbalanced: usize,
     /// Number of edges of more than two triangles, and the midpoint of the first one.
-    shared: Option<(usize, Vec3)>,
+    non_manifold: Option<(usize, Vec3)>,
 }
 
 /// Reads all pieces and examines them one by one.
@@ -70,9 +70,9 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
 
 fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     let mut defects = Vec::new();
-    let mesh = finite(mesh).map(merged).unwrap_or_default();
+    let mesh = finite(mesh).map(merge_points).unwrap_or_default();
     let edges = edge_use(&mesh);
-    if let Some((count, at)) = edges.shared {
+    if let Some((count, at)) = edges.non_manifold {
         defects.push(Finding::SharedEdges {
             piece,
             count,
@@ -117,7 +117,7 @@ pub fn finite(mesh: &TriMesh) -> Option<&TriMesh> {
 }
 
 /// Merges equal points of `mesh`, and drops triangles that collapse. Points keep their original order.
-pub fn merged(mesh: &TriMesh) -> TriMesh {
+pub fn merge_points(mesh: &TriMesh) -> TriMesh {
     let cell = |p: Vec3| {
         p.to_array()
             .map(|x| (f64::from(x as f32) / MERGE_MM).round() as i64)
@@ -160,14 +160,14 @@ fn edge_use(mesh: &TriMesh) -> EdgeUse {
     edges.sort_unstable();
     let mut found = EdgeUse {
         n_unbalanced: 0,
-        shared: None,
+        non_manifold: None,
     };
     for uses in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
         let forwards = uses.iter().filter(|e| e.2).count();
         found.n_unbalanced += usize::from(2 * forwards != uses.len());
         if uses.len() > 2 {
             let middle = 0.5 * (mesh.points[uses[0].0 as usize] + mesh.points[uses[0].1 as usize]);
-            found.shared = Some(found.shared.map_or((1, middle), |(n, at)| (n + 1, at)));
+            found.non_manifold = Some(found.non_manifold.map_or((1, middle), |(n, at)| (n + 1, at)));
         }
     }
     found
@@ -179,7 +179,7 @@ mod tests {
 
     use super::*;
 
-    fn joined(parts: &[TriMesh]) -> TriMesh {
+    fn join(parts: &[TriMesh]) -> TriMesh {
         let mut all = TriMesh::default();
         for part in parts {
             let first = all.points.len() as u32;
@@ -208,7 +208,7 @@ mod tests {
             [Finding::NotClosed { piece: PatchId(3) }]
         );
 
-        let apart = joined(&[cube.clone(), cuboid([5.0; 3], [6.0; 3]).to_mesh()]);
+        let apart = join(&[cube.clone(), cuboid([5.0; 3], [6.0; 3]).to_mesh()]);
         assert_eq!(
             found(&apart),
             [Finding::SeveralBodies {
@@ -218,7 +218,7 @@ mod tests {
         );
 
         // Two cubes that touch along an edge: closed, but the edge has four faces.
-        let touching = joined(&[cube, cuboid([2.0, 2.0, 0.0], [4.0, 4.0, 2.0]).to_mesh()]);
+        let touching = join(&[cube, cuboid([2.0, 2.0, 0.0], [4.0, 4.0, 2.0]).to_mesh()]);
         let shared = found(&touching);
         assert!(
             matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]),

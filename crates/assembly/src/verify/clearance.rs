@@ -12,7 +12,7 @@ use shellock_geom::clearance::{Scope, Shape, Translation, least_gap, swept_gap};
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::{Solid, TriMesh};
 
-use super::body::{finite, merged};
+use super::body::{finite, merge_points};
 use crate::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -177,7 +177,7 @@ fn among<P: Send, G: Send>(
 }
 
 fn shape(outside: Option<&TriangleBvh>, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
-    let mesh = finite(mesh).map(merged)?;
+    let mesh = finite(mesh).map(merge_points)?;
     let below_rim = |p| {
         outside
             .and_then(|outside| outside.nearest(p, rim_mm * rim_mm))
@@ -186,7 +186,7 @@ fn shape(outside: Option<&TriangleBvh>, mesh: &TriMesh, rim_mm: f64) -> Option<S
     let values: Vec<f64> = mesh.points.iter().map(|&p| below_rim(p)).collect();
     let cut = cut_at_zero(&mesh, &values, |_| true);
     let solid = Solid::new(cut.mesh).ok()?;
-    Some(Shape::new(&solid).counting(|face| cut.side[face] == Side::Positive))
+    Some(Shape::new(&solid).count_only(|face| cut.side[face] == Side::Positive))
 }
 
 fn place(gap_mm: f64, travel_mm: f64, at: [f64; 3]) -> NearestPlace {

@@ -43,7 +43,7 @@ pub struct Grid {
 
 impl Grid {
     /// Grid that covers the shadow of `bounds`, a box in frame coordinates.
-    pub fn covering(bounds: Aabb, pixel_mm: f64) -> Self {
+    pub fn cover(bounds: Aabb, pixel_mm: f64) -> Self {
         let size = bounds.size();
         let count = |length: f64| (length / pixel_mm).ceil() as usize + 1;
         Self {
@@ -238,7 +238,7 @@ mod tests {
                 )
             };
             let (p, q) = (projected(&holed), projected(&other));
-            let grid = Grid::covering(Aabb::around(p.0.iter().copied()), 0.1);
+            let grid = Grid::cover(Aabb::around(p.0.iter().copied()), 0.1);
             let (p, q) = (
                 Columns::of(&grid, &p.0, &p.1, Vec3::ZERO),
                 Columns::of(&grid, &q.0, &q.1, Vec3::ZERO),

@@ -41,10 +41,10 @@ impl Kit {
     }
 
     pub fn verdict(&self) -> Verification {
-        self.examined().0
+        self.examine().0
     }
 
-    pub fn examined(&self) -> (Verification, Vec<Contact>) {
+    pub fn examine(&self) -> (Verification, Vec<Contact>) {
         let params = VerifyParams {
             clearance_mm: 2.0 * HALF_GAP_MM,
             seed: 0,

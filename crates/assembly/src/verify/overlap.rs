@@ -7,7 +7,7 @@ use shellock_report::Warning;
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::limits::{OUTSIDE_SHARE, OVERLAP_MM3};
-use super::{Check, Finding, rounded};
+use super::{Check, Finding, round};
 use crate::PressFit;
 use crate::causes::Cause;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
@@ -47,8 +47,8 @@ pub fn check_pairs(
                 .iter()
                 .filter(|fit| [solid[a].0, solid[b].0].contains(&fit.piece))
                 .collect();
-            let common = shared(solid[a].1, solid[b].1, &fits);
-            Ok((rounded(common.volume()), common.bounds().center()))
+            let common = common_volume(solid[a].1, solid[b].1, &fits);
+            Ok((round(common.volume()), common.bounds().center()))
         })
         .collect::<Result<_, Cancelled>>()?;
     let (mut worst, mut findings) = (0.0f64, Vec::new());
@@ -73,7 +73,7 @@ pub fn check_pairs(
 }
 
 /// Common volume of both, without parts that are near a press fit and no larger than it needs.
-fn shared(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
+fn common_volume(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
     let common = a.intersect(b);
     if fits.is_empty() {
         return common;
@@ -102,7 +102,7 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
     let spacing_mm = (RAY_SPACING * bounds.diagonal()).clamp(RAY_SPACING_MM.0, RAY_SPACING_MM.1);
     // A piece far away must not make the grid larger than memory.
     let spacing_mm = spacing_mm.max(bounds.diagonal() / 4000.0);
-    let grid = Grid::covering(bounds, spacing_mm);
+    let grid = Grid::cover(bounds, spacing_mm);
     let whole = Columns::of(&grid, &model_points, &model.mesh().triangles, Vec3::ZERO);
     let ids: Vec<PatchId> = bodies.ids().collect();
     let outside: Vec<f64> = ids
@@ -117,7 +117,7 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
             (piece.length_mm() - piece.common_length_mm(&whole)) * grid.cell_mm2()
         })
         .collect();
-    let volume_mm3 = rounded(outside.iter().sum());
+    let volume_mm3 = round(outside.iter().sum());
     let ok = volume_mm3 <= OUTSIDE_SHARE * model.volume();
     let check = Check::new("nothing outside the model", ok, format!("{volume_mm3:.3} mm³"));
     (check, (!ok).then_some(Finding::Outside { volume_mm3 }))
@@ -141,7 +141,7 @@ mod tests {
             travel_mm: 2.0,
         };
         let floor = cuboid([-9.0, -9.0, -9.0], [9.0, 9.0, 0.0]);
-        let shared_with = |bump: Volume| shared(&floor, &bump, &[&fit]).volume();
+        let shared_with = |bump: Volume| common_volume(&floor, &bump, &[&fit]).volume();
         assert_eq!(shared_with(cuboid([-0.5, -0.5, -0.2], [0.5, 0.5, 3.0])), 0.0);
         let large = shared_with(cuboid([-1.0, -1.0, -0.4], [1.0, 1.0, 3.0]));
         assert!((large - 1.6).abs() < 1e-9, "{large}");

@@ -21,7 +21,7 @@ use shellock_geom::{Aabb, Vec3, Volume};
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::limits::{RUB_MM, RUB_MM3, TRAVELS_MM};
-use super::{Check, Finding, rounded};
+use super::{Check, Finding, round};
 use crate::InstallationStep;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -95,7 +95,7 @@ fn check_path(
         |id: PatchId| -> Vec<Vec3> { bodies[id].mesh.points.iter().map(|&p| frame.project(p)).collect() };
     let points = project(piece);
     let shadow = Aabb::around(points.iter().copied());
-    let grid = Grid::covering(
+    let grid = Grid::cover(
         shadow,
         PIXEL_MM.max(shadow.size().truncate().max_element() / MOST_PIXELS),
     );
@@ -209,7 +209,7 @@ fn rub_at(
     partners: &[(PatchId, &Volume)],
 ) -> Option<Finding> {
     let moved = moving.translate(travel);
-    let measured = |hit: Volume| (rounded(hit.volume()), rounded(hit.area()), hit.bounds().center());
+    let measured = |hit: Volume| (round(hit.volume()), round(hit.area()), hit.bounds().center());
     let hits: Vec<(PatchId, (f64, f64, Vec3))> = partners
         .iter()
         .map(|&(id, v)| (id, measured(moved.intersect(v))))
@@ -222,7 +222,7 @@ fn rub_at(
         return None;
     }
     let &(against, (volume_mm3, area, at)) = hits.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let thickness_mm = rounded(2.0 * volume_mm3 / area);
+    let thickness_mm = round(2.0 * volume_mm3 / area);
     Some(Finding::PathRubs {
         piece,
         against,
@@ -274,7 +274,7 @@ mod tests {
             let project =
                 |m: &Volume| -> Vec<Vec3> { m.to_mesh().points.iter().map(|&x| frame.project(x)).collect() };
             let points = project(&p);
-            let grid = Grid::covering(Aabb::around(points.iter().copied()), 0.1);
+            let grid = Grid::cover(Aabb::around(points.iter().copied()), 0.1);
             let own = Columns::of(&grid, &points, &p.to_mesh().triangles, Vec3::ZERO);
             let theirs = Columns::of(&grid, &project(&q), &q.to_mesh().triangles, Vec3::ZERO);
             let events = events_between(&own, &theirs);

@@ -14,7 +14,7 @@ use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::contact::Contact;
 use super::limits::HOLD_MM3;
-use super::{Check, Finding, rounded};
+use super::{Check, Finding, round};
 use crate::{Cancelled, Ctx, IdVec, PatchId, push};
 
 /// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece counts as held: at a depth of
@@ -165,7 +165,7 @@ fn free_directions(
     let points = &projected[usize::from(piece)];
     let shadow = Aabb::around(points.iter().copied()).grown(step_mm);
     let levels = LEVELS.map(|(spacing_mm, surely_held_mm3)| {
-        let grid = Grid::covering(
+        let grid = Grid::cover(
             shadow,
             spacing_mm.max(shadow.size().truncate().max_element() / MOST_PIXELS),
         );
@@ -209,7 +209,7 @@ fn free_directions(
 fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
     let mut sum = 0.0;
     others.iter().any(|(_, other)| {
-        sum += rounded(moved.intersect(other).volume());
+        sum += round(moved.intersect(other).volume());
         sum >= HOLD_MM3
     })
 }

@@ -45,8 +45,8 @@ fn pieces_of_another_size_are_refused_without_asking_for_paths() {
         let mesh = &mut kit.pieces[PatchId(piece)];
         mesh.points.iter_mut().for_each(|p| *p *= 1000.0);
     }
-    let (verdict, contacts) = kit.examined();
-    assert!(!verdict.passed() && contacts.is_empty());
+    let (verdict, contacts) = kit.examine();
+    assert!(!verdict.has_passed() && contacts.is_empty());
     assert!(
         verdict
             .findings
@@ -186,7 +186,7 @@ fn any_input_gives_a_verdict() {
             .next(),
         Some("plan names every piece once")
     );
-    assert!(!kit.verdict().passed());
+    assert!(!kit.verdict().has_passed());
 }
 
 #[test]

@@ -162,7 +162,7 @@ pub fn thin_points(
         if limit_mm <= 0.0 {
             return Vec::new();
         }
-        joined(&samples.par_iter().filter_map(point).collect::<Vec<_>>())
+        group(&samples.par_iter().filter_map(point).collect::<Vec<_>>())
     };
     let [least_wall_mm, least_slot_mm] = limits_mm;
     let mut places = [
@@ -198,7 +198,7 @@ fn feature(members: &[ThinPoint]) -> ThinFeature {
 }
 
 /// Groups of points linked by steps of [`JOINED_MM`], in the order of their first points.
-fn joined(points: &[ThinPoint]) -> Vec<Vec<ThinPoint>> {
+fn group(points: &[ThinPoint]) -> Vec<Vec<ThinPoint>> {
     let cube = |p: Vec3| (p / JOINED_MM).floor().to_array().map(|x| x as i32);
     let mut members: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (i, p) in points.iter().enumerate() {

@@ -27,13 +27,13 @@ impl PlaceWords for Coordinates {
 
 impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(&self.told(&Coordinates))
+        f.write_str(&self.describe(&Coordinates))
     }
 }
 
 impl Finding {
     /// Sentence about the finding, with places worded by `words`.
-    pub fn told(&self, words: &dyn PlaceWords) -> String {
+    pub fn describe(&self, words: &dyn PlaceWords) -> String {
         match self {
             Self::PlanBroken { piece } => format!("the plan does not name piece {piece} exactly once"),
             Self::NotClosed { piece } => {

@@ -131,7 +131,7 @@ impl<'a> Plate<'a> {
                 name,
                 color: palette::color(part.fit.number as usize),
                 mesh: &part.mesh,
-                turned: Some(part.turned),
+                rotation: Some(part.turned),
                 moved_mm: part.moved_mm,
             })
             .collect();

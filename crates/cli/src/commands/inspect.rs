@@ -88,7 +88,7 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
     );
     println!(
         "{} open edges, {} edges of more than two faces",
-        found.edges.open.count, found.edges.shared.count
+        found.edges.open.count, found.edges.non_manifold.count
     );
     let objects = objects(loaded);
     if !objects.is_empty() {
@@ -161,11 +161,11 @@ fn told(
     );
     let mut value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(),
         "bodies": found.bodies.len(), "size": loaded.bounds().size().to_array(),
-        "unit_mm": loaded.unit_mm, "unit_is_stated": loaded.unit_is_stated,
+        "unit_mm": loaded.unit_mm, "unit_is_stated": loaded.has_unit,
         "volume_mm3": model.as_ref().ok().map(|m| m.solid.volume()),
         "size_mm": size_mm.map(|size| size.to_array()), "objects": objects(loaded),
         "open_edges": found.edges.open.count,
-        "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
+        "shared_edges": found.edges.non_manifold.count, "has_labels": loaded.face_labels().is_some(),
         "divided_by": labellings(loaded), "is_sound": is_sound,
         "repairs": repairs, "notes": notes, "warnings": warnings,
         "can_be_made": model.is_ok(), "error": error });

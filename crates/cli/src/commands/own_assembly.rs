@@ -26,11 +26,11 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
     let found = own.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();
     let found = found?;
-    let code = u8::from(!found.passed());
+    let code = u8::from(!found.has_passed());
     if session.is_json {
         println!(
             "{}",
-            json!({ "passed": found.passed(), "checks": found.checks, "findings": found.findings,
+            json!({ "passed": found.has_passed(), "checks": found.checks, "findings": found.findings,
                     "exit_code": code })
         );
     } else {

@@ -20,11 +20,11 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let verdict = kit.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();
     let verdict = verdict?;
-    let code = u8::from(!verdict.passed());
+    let code = u8::from(!verdict.has_passed());
     if session.is_json {
         println!(
             "{}",
-            json!({ "passed": verdict.passed(), "checks": verdict.checks, "findings": verdict.findings,
+            json!({ "passed": verdict.has_passed(), "checks": verdict.checks, "findings": verdict.findings,
                     "exit_code": code })
         );
     } else {

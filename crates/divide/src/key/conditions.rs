@@ -93,7 +93,7 @@ fn flatness(surface: &SegmentedSurface, key: PatchId) -> Option<(f64, (Vec3, f64
         tolerance_mm,
     };
     let step = spots.len().div_ceil(N_PLANES).max(1);
-    let planes = spots.iter().step_by(step).map(|s| through(s).refined(&spots));
+    let planes = spots.iter().step_by(step).map(|s| through(s).refine(&spots));
     let best = planes.max_by(|a, b| a.area_mm2(&spots).total_cmp(&b.area_mm2(&spots)))?;
     let off_mm = |s: &Spot| (s.center - best.at).dot(best.normal).abs();
     let farthest = spots.iter().max_by(|a, b| off_mm(a).total_cmp(&off_mm(b)))?;

@@ -191,7 +191,7 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
                 .copied()
                 .filter(|s| s.center.distance(p.at) < reach_mm)
                 .collect();
-            let plane = p.refined(&near);
+            let plane = p.refine(&near);
             (plane.area_mm2(&near), plane)
         })
         .collect();
@@ -353,7 +353,7 @@ fn scored(
     let flat_share = flat / area;
     let up = Vec3::from(params.up).normalize_or_zero();
     let shown = 0.5 * (1.0 + (facing / area).dot(up));
-    let turned = if Turn::laying(prism.normal, prism.slide).0.is_none() {
+    let turned = if Turn::align(prism.normal, prism.slide).0.is_none() {
         0.0
     } else {
         TURN_COST

@@ -70,7 +70,7 @@ fn laying_turns_as_little_as_it_can_and_not_at_all_where_all_fits() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for _ in 0..200 {
         let prism = random_prism(&mut rng);
-        let (turn, along) = Turn::laying(prism.normal, prism.slide);
+        let (turn, along) = Turn::align(prism.normal, prism.slide);
         assert!(turn.apply(prism.slide).distance(along.unit()) < 1e-12);
         let axis = turn.apply(prism.normal);
         assert!(axis.abs().max_element() > 1.0 - 1e-12 && axis.dot(along.unit()).abs() < 1e-12);
@@ -80,7 +80,7 @@ fn laying_turns_as_little_as_it_can_and_not_at_all_where_all_fits() {
         assert!(turn.angle() < 1.2, "{}", turn.angle());
     }
     for s in LatticeDirection::all().filter(|s| s.step()[2] == 0) {
-        let (turn, along) = Turn::laying(-Vec3::Z, s.unit());
+        let (turn, along) = Turn::align(-Vec3::Z, s.unit());
         assert!(turn.is_none() && along == s);
     }
 }
@@ -93,7 +93,7 @@ fn the_best_key_of_a_ball_with_a_foot_is_in_the_foot_and_slides_level() {
     assert!(best.prism.normal.dot(-Vec3::Z) > 0.999 && best.prism.slide.z.abs() < 1e-9);
     assert!(best.side_share > 0.7, "{best:?}");
     // Of all directions round the foot it takes one for which the ball need not be turned.
-    assert!(Turn::laying(best.prism.normal, best.prism.slide).0.is_none());
+    assert!(Turn::align(best.prism.normal, best.prism.slide).0.is_none());
     assert!(found.windows(2).all(|w| w[0].score >= w[1].score));
 }
 

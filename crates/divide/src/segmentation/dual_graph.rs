@@ -68,7 +68,7 @@ impl DualGraph {
             let face_area = mesh.face_area(face);
             area[c as usize] += face_area;
             center[c as usize] += mesh.face_center(face) * face_area;
-            normal[c as usize] += mesh.area_vector_doubled(face);
+            normal[c as usize] += mesh.double_area_vector(face);
         }
         for (face, &c) in cell.iter().enumerate() {
             if area[c as usize] == 0.0 {

@@ -92,8 +92,8 @@ impl Method {
             ..RandomCutsParams::default()
         };
         let part_of_face = match self {
-            Self::Auto => return Some(auto::divide_keeping(&AutoParams { cuts }, mesh, whole)),
-            Self::RandomCuts => return Some(random_cuts::divide_keeping(&cuts, mesh, whole)),
+            Self::Auto => return Some(auto::divide_with_whole(&AutoParams { cuts }, mesh, whole)),
+            Self::RandomCuts => return Some(random_cuts::divide_with_whole(&cuts, mesh, whole)),
             Self::Sdf => {
                 let params = SdfParams {
                     n_parts,

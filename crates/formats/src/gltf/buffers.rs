@@ -63,7 +63,7 @@ fn decode(uri: &str) -> Content<'static> {
     let Some((head, text)) = head_and_text else {
         return Content::Elsewhere(uri.chars().take(QUOTED_CHARS).collect());
     };
-    let bytes = percent_decoded(text);
+    let bytes = decode_percent(text);
     let is_base64 = head
         .rsplit(';')
         .next()
@@ -78,7 +78,7 @@ fn decode(uri: &str) -> Content<'static> {
 }
 
 /// Decodes each `%` with two hexadecimal digits to a byte; other `%` are kept.
-fn percent_decoded(text: &str) -> Cow<'_, [u8]> {
+fn decode_percent(text: &str) -> Cow<'_, [u8]> {
     let bytes = text.as_bytes();
     if !bytes.contains(&b'%') {
         return Cow::Borrowed(bytes);

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use super::super::ReadError;
 use super::document::{Instancing, Node};
 use super::error;
-use super::nodes::moved;
+use super::nodes::compose;
 use super::values::{Accessors, Shape, Values};
 
 impl Accessors<'_> {
@@ -55,7 +55,7 @@ impl Accessors<'_> {
         let place = |row| {
             let of = |values: &Option<Values>, default| values.as_ref().map_or(default, |v| v.row(row));
             let rotation = rotations.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |v| v.row(row));
-            placed * moved(of(&translations, [0.0; 3]), rotation, of(&scales, [1.0; 3]))
+            placed * compose(of(&translations, [0.0; 3]), rotation, of(&scales, [1.0; 3]))
         };
         Ok((0..n_instances).map(place).collect())
     }

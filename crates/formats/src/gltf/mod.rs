@@ -84,11 +84,11 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
         effort: effort::Effort::default(),
     };
     let nodes = Nodes::of(&document)?;
-    let scene = Scene::of(&accessors, &nodes)?;
+    let scene = VisibleScene::of(&accessors, &nodes)?;
     let mut surface = Surface::default();
     for figure in &scene.figures {
         let counts = scene.meshes[figure.mesh].as_ref();
-        let counts = counts.ok_or_else(|| missing("mesh", figure.mesh))?;
+        let counts = counts.ok_or_else(|| missing_error("mesh", figure.mesh))?;
         surface.add(&accessors, &nodes, figure, counts)?;
     }
     if surface.mesh.triangles.is_empty() {
@@ -96,11 +96,11 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
     }
     let mut notes = notes(&document, &nodes);
     notes.extend(scene.note());
-    Ok(loaded(surface, notes, format))
+    Ok(load_surface(surface, notes, format))
 }
 
 /// Visible part of a document, counted before any triangle is made.
-struct Scene {
+struct VisibleScene {
     figures: Vec<Figure>,
     /// Counts of the visible meshes; `None` for others.
     meshes: Vec<Option<Counts>>,
@@ -108,7 +108,7 @@ struct Scene {
     n_without_triangles: usize,
 }
 
-impl Scene {
+impl VisibleScene {
     /// Collects the visible nodes with triangles; an error for more triangles or copies than the limits.
     fn of(accessors: &Accessors, nodes: &Nodes) -> Result<Self, ReadError> {
         let document = accessors.document;
@@ -118,11 +118,14 @@ impl Scene {
             n_without_triangles: 0,
         };
         let (mut n_occurrences, mut n_triangles) = (0_u64, 0_u64);
-        for &node in &nodes.shown {
+        for &node in &nodes.visible {
             let Some(mesh) = document.nodes[node].mesh else {
                 continue;
             };
-            let counts = scene.meshes.get_mut(mesh).ok_or_else(|| missing("mesh", mesh))?;
+            let counts = scene
+                .meshes
+                .get_mut(mesh)
+                .ok_or_else(|| missing_error("mesh", mesh))?;
             let counts = match counts {
                 Some(counts) => counts,
                 new => new.insert(accessors.count(&document.meshes[mesh])?),
@@ -166,7 +169,7 @@ impl Scene {
     }
 }
 
-fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
+fn load_surface(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
     let all = [
         (LabelSource::Material, surface.material),
         (LabelSource::Object, surface.object),
@@ -180,7 +183,7 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
         mesh: surface.mesh,
         format,
         unit_mm: Some(UNIT_MM),
-        unit_is_stated: false,
+        has_unit: false,
         objects: surface.objects,
         empty_plates: Vec::new(),
         cutters: Vec::new(),
@@ -249,7 +252,7 @@ fn error(reason: impl Into<String>) -> ReadError {
     }
 }
 
-fn missing(kind: &'static str, id: usize) -> ReadError {
+fn missing_error(kind: &'static str, id: usize) -> ReadError {
     ReadError::MissingPart {
         kind,
         id: id.to_string(),

@@ -4,14 +4,14 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 
 use super::super::ReadError;
 use super::document::{Document, Node};
-use super::{error, missing};
+use super::{error, missing_error};
 
 /// The nodes of a document with their transforms.
 pub(super) struct Nodes {
     /// Transform from each node to the scene, visible or not.
-    pub(super) placed: Vec<DAffine3>,
+    pub(super) transforms: Vec<DAffine3>,
     /// Visible nodes, each once, parents before children in file order.
-    pub(super) shown: Vec<usize>,
+    pub(super) visible: Vec<usize>,
     /// Number of nodes in the scene that have a mesh and are hidden, by themselves or by an ancestor.
     pub(super) n_hidden: usize,
 }
@@ -21,28 +21,28 @@ impl Nodes {
     pub(super) fn of(document: &Document) -> Result<Self, ReadError> {
         let nodes = &document.nodes;
         let parents = parents(nodes)?;
-        let mut placed = vec![DAffine3::IDENTITY; nodes.len()];
+        let mut transforms = vec![DAffine3::IDENTITY; nodes.len()];
         let mut is_hidden = vec![false; nodes.len()];
         let order = parents_first(nodes, &parents)?;
         for &id in &order {
             let (above, is_hidden_above) = match parents[id] {
-                Some(parent) => (placed[parent], is_hidden[parent]),
+                Some(parent) => (transforms[parent], is_hidden[parent]),
                 None => (DAffine3::IDENTITY, false),
             };
-            placed[id] = above * local(&nodes[id]);
+            transforms[id] = above * local(&nodes[id]);
             is_hidden[id] = is_hidden_above || hides(&nodes[id]);
         }
-        let (mut shown, mut n_hidden) = (Vec::new(), 0);
+        let (mut visible, mut n_hidden) = (Vec::new(), 0);
         for id in in_scene(document, &parents)? {
             if !is_hidden[id] {
-                shown.push(id);
+                visible.push(id);
             } else if nodes[id].mesh.is_some() {
                 n_hidden += 1;
             }
         }
         Ok(Self {
-            placed,
-            shown,
+            transforms,
+            visible,
             n_hidden,
         })
     }
@@ -53,7 +53,9 @@ fn parents(nodes: &[Node]) -> Result<Vec<Option<usize>>, ReadError> {
     let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
     for (id, node) in nodes.iter().enumerate() {
         for &child in &node.children {
-            let parent = parents.get_mut(child).ok_or_else(|| missing("node", child))?;
+            let parent = parents
+                .get_mut(child)
+                .ok_or_else(|| missing_error("node", child))?;
             if let Some(other) = parent.replace(id) {
                 return Err(error(format!(
                     "node {child} is a child of node {other} and again of node {id}"
@@ -101,7 +103,7 @@ fn in_scene(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>
     let mut found = Vec::new();
     let mut todo: Vec<usize> = roots.into_iter().rev().collect();
     while let Some(id) = todo.pop() {
-        let is_found = is_found.get_mut(id).ok_or_else(|| missing("node", id))?;
+        let is_found = is_found.get_mut(id).ok_or_else(|| missing_error("node", id))?;
         if !std::mem::replace(is_found, true) {
             found.push(id);
             todo.extend(nodes[id].children.iter().rev());
@@ -119,7 +121,7 @@ fn hides(node: &Node) -> bool {
 fn local(node: &Node) -> DAffine3 {
     match node.matrix {
         Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(&columns)),
-        None => moved(
+        None => compose(
             node.translation.unwrap_or([0.0; 3]),
             node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]),
             node.scale.unwrap_or([1.0; 3]),
@@ -129,7 +131,7 @@ fn local(node: &Node) -> DAffine3 {
 
 /// Composes a scaling, then a rotation by a quaternion (x, y, z, w), then a translation. The quaternion is
 /// normalised; one of length 0 gives no rotation.
-pub(super) fn moved(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> DAffine3 {
+pub(super) fn compose(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> DAffine3 {
     let rotation = DQuat::from_array(rotation);
     let length = rotation.length();
     let rotation = if length > 0.0 {

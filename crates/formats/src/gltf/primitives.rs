@@ -45,7 +45,7 @@ pub(super) struct Piece {
 }
 
 /// Colours of a primitive's points, one for each of those in use.
-pub(super) struct Colors {
+pub(super) struct PointColors {
     pub(super) colors: Vec<Color>,
     /// True if the primitive has an accessor of colours, not only its material's colour.
     pub(super) are_own: bool,
@@ -116,13 +116,13 @@ impl Accessors<'_> {
     }
 
     /// Computes the displayed colours of the points of `piece`: point colours times the material's colour.
-    pub(super) fn colors(&self, primitive: &Primitive, piece: &Piece) -> Result<Colors, ReadError> {
+    pub(super) fn colors(&self, primitive: &Primitive, piece: &Piece) -> Result<PointColors, ReadError> {
         let material = primitive.material.and_then(|m| self.document.materials.get(m));
         let factor = material.map_or(WHITE, base_color);
         let own = primitive.attributes.get("COLOR_0");
         let of = |color: [f64; 4]| std::array::from_fn(|c| eight_bits(color[c] * factor[c]));
         let Some(&own) = own else {
-            return Ok(Colors {
+            return Ok(PointColors {
                 colors: vec![of(WHITE); piece.used.len()],
                 are_own: false,
             });
@@ -143,7 +143,7 @@ impl Accessors<'_> {
                 [red, green, blue, 1.0]
             })
         };
-        Ok(Colors {
+        Ok(PointColors {
             colors: piece.used.iter().map(color).collect(),
             are_own: true,
         })

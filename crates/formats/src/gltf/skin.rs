@@ -11,7 +11,7 @@ use super::document::Primitive;
 use super::nodes::Nodes;
 use super::primitives::Piece;
 use super::values::{Accessors, Shape, Values};
-use super::{error, missing};
+use super::{error, missing_error};
 
 /// Largest number of joints that points can address, in 16 bits.
 const MAX_JOINTS: usize = 1 << 16;
@@ -39,7 +39,7 @@ impl Accessors<'_> {
     /// Computes the pose of skin `which`. Missing inverse bind matrices are identities.
     pub(super) fn pose(&self, which: usize, nodes: &Nodes) -> Result<Pose, ReadError> {
         let skin = self.document.skins.get(which);
-        let skin = skin.ok_or_else(|| missing("skin", which))?;
+        let skin = skin.ok_or_else(|| missing_error("skin", which))?;
         let binds = skin.inverse_bind_matrices;
         let binds = binds.map(|b| self.values(b, Shape::Mat4)).transpose()?;
         let joints = &skin.joints[..skin.joints.len().min(MAX_JOINTS)];
@@ -52,7 +52,10 @@ impl Accessors<'_> {
         }
         self.effort.spend(joints.len())?;
         let scene_from_mesh = joints.iter().enumerate().map(|(k, &joint)| {
-            let placed = nodes.placed.get(joint).ok_or_else(|| missing("node", joint))?;
+            let placed = nodes
+                .transforms
+                .get(joint)
+                .ok_or_else(|| missing_error("node", joint))?;
             let bind = binds.as_ref().map_or(DAffine3::IDENTITY, |binds| {
                 DAffine3::from_mat4(DMat4::from_cols_array(&binds.row(k)))
             });
@@ -72,7 +75,7 @@ impl Accessors<'_> {
     }
 
     /// Moves the points of `piece` to `pose`; `None` if the primitive has no joints or no weights.
-    pub(super) fn posed(
+    pub(super) fn apply_pose(
         &self,
         primitive: &Primitive,
         pose: &Pose,

@@ -58,7 +58,7 @@ impl Surface {
     ) -> Result<(), ReadError> {
         let node = &accessors.document.nodes[figure.node];
         let mesh = &accessors.document.meshes[figure.mesh];
-        let places = accessors.places(node, figure.n_instances, nodes.placed[figure.node])?;
+        let places = accessors.places(node, figure.n_instances, nodes.transforms[figure.node])?;
         let pose = node.skin.map(|skin| accessors.pose(skin, nodes)).transpose()?;
         let weights = node.weights.as_ref().unwrap_or(&mesh.weights);
         for &number in &counts.with_triangles {
@@ -74,15 +74,15 @@ impl Surface {
                 object: self.objects.len() as i64,
             };
             let posed = match &pose {
-                Some(pose) => accessors.posed(primitive, pose, &piece)?,
+                Some(pose) => accessors.apply_pose(primitive, pose, &piece)?,
                 None => None,
             };
             if let Some(posed) = posed {
-                self.add_posed(&copy, &posed)?;
+                self.add_skin(&copy, &posed)?;
                 continue;
             }
             for &placed in &places {
-                self.add_placed(&copy, placed)?;
+                self.add_copy(&copy, placed)?;
                 copy.object += 1;
             }
         }
@@ -113,7 +113,7 @@ impl Surface {
     }
 
     /// Adds a copy with one transform for all points.
-    fn add_placed(&mut self, copy: &Copy, placed: DAffine3) -> Result<(), ReadError> {
+    fn add_copy(&mut self, copy: &Copy, placed: DAffine3) -> Result<(), ReadError> {
         let points = copy.piece.points.iter().map(|&p| placed.transform_point3(p));
         let first = self.add_points(copy, points)?;
         let is_mirrored = placed.matrix3.determinant() < 0.0;
@@ -123,7 +123,7 @@ impl Surface {
 
     /// Adds a copy whose points are moved by joints. A triangle is mirrored if the determinants at its
     /// corners have a negative sum.
-    fn add_posed(&mut self, copy: &Copy, posed: &Posed) -> Result<(), ReadError> {
+    fn add_skin(&mut self, copy: &Copy, posed: &Posed) -> Result<(), ReadError> {
         let first = self.add_points(copy, posed.points.iter().copied())?;
         let determinant = |corner: u32| posed.determinants[corner as usize];
         self.add_triangles(copy, first, |corners| {

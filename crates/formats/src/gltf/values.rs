@@ -4,7 +4,7 @@ use super::super::ReadError;
 use super::buffers::Content;
 use super::document::{Accessor, Document, Sparse};
 use super::effort::Effort;
-use super::{compression, error, is_compressed, missing};
+use super::{compression, error, is_compressed, missing_error};
 
 /// Supported shapes of rows.
 #[derive(Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ pub(super) struct Values<'a> {
     /// Rows before sparse replacement; all zeros if absent.
     base: Option<Rows<'a>>,
     sparse: Option<Replaced<'a>>,
-    component: Component,
+    component: ComponentType,
     is_normalized: bool,
     /// Number of rows. No bytes back it if `base` is absent.
     pub(super) count: usize,
@@ -52,7 +52,7 @@ struct Replaced<'a> {
 }
 
 #[derive(Clone, Copy)]
-enum Component {
+enum ComponentType {
     I8,
     U8,
     I16,
@@ -62,7 +62,7 @@ enum Component {
     F64,
 }
 
-impl Component {
+impl ComponentType {
     fn of(code: u32) -> Result<Self, ReadError> {
         Ok(match code {
             5120 => Self::I8,
@@ -148,7 +148,9 @@ pub(super) struct Accessors<'a> {
 impl Accessors<'_> {
     pub(super) fn accessor(&self, which: usize) -> Result<&Accessor, ReadError> {
         let accessors = &self.document.accessors;
-        accessors.get(which).ok_or_else(|| missing("accessor", which))
+        accessors
+            .get(which)
+            .ok_or_else(|| missing_error("accessor", which))
     }
 
     /// Returns the shape of accessor `which`; an error unless it is one of `shapes`.
@@ -174,7 +176,7 @@ impl Accessors<'_> {
     pub(super) fn values_or_zeros(&self, which: usize, shape: Shape) -> Result<Values<'_>, ReadError> {
         let accessor = self.accessor(which)?;
         self.shape(which, &[shape])?;
-        let component = Component::of(accessor.component_type)?;
+        let component = ComponentType::of(accessor.component_type)?;
         let row_bytes = shape.name_and_columns().1 * component.n_bytes();
         let rows = |view, offset, count| self.rows(view, offset, count, row_bytes, which);
         let base = accessor.buffer_view;
@@ -205,7 +207,7 @@ impl Accessors<'_> {
         which: usize,
     ) -> Result<Vec<(u32, u32)>, ReadError> {
         let part = &sparse.indices;
-        let component = Component::of(part.component_type)?;
+        let component = ComponentType::of(part.component_type)?;
         let values = Values {
             base: Some(self.rows(
                 part.buffer_view,
@@ -252,9 +254,11 @@ impl Accessors<'_> {
         which: usize,
     ) -> Result<Rows<'_>, ReadError> {
         let views = &self.document.buffer_views;
-        let view = views.get(view).ok_or_else(|| missing("buffer view", view))?;
+        let view = views
+            .get(view)
+            .ok_or_else(|| missing_error("buffer view", view))?;
         let content = self.contents.get(view.buffer);
-        let content = content.ok_or_else(|| missing("buffer", view.buffer))?;
+        let content = content.ok_or_else(|| missing_error("buffer", view.buffer))?;
         let Some(buffer) = content.bytes(view.buffer)? else {
             return Err(match compression(&view.extensions) {
                 Some(name) => is_compressed(name),

@@ -1,6 +1,6 @@
 //! The header of a PLY file, which declares the values after it.
 
-use super::super::text::{Lines, malformed, words};
+use super::super::text::{Lines, syntax_error, words};
 use super::super::{Place, ReadError};
 
 /// Encoding of the values after the header.
@@ -56,7 +56,7 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    fn named(name: &[u8]) -> Option<Self> {
+    fn from_name(name: &[u8]) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_slice() {
             b"char" | b"int8" => Self::I8,
             b"uchar" | b"uint8" => Self::U8,
@@ -86,7 +86,7 @@ impl Header {
         let mut lines = Lines::of(bytes);
         let (at, magic) = lines.next().unwrap_or((Place::Line(1), b""));
         if !magic.trim_ascii().eq_ignore_ascii_case(b"ply") {
-            return Err(malformed(at, "\"ply\"", magic));
+            return Err(syntax_error(at, "\"ply\"", magic));
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
@@ -103,18 +103,19 @@ impl Header {
                 Some(b"element") => {
                     let element = read_element(words, at)?;
                     if elements.iter().any(|e| e.name == element.name) {
-                        return Err(malformed(at, "each element once", line));
+                        return Err(syntax_error(at, "each element once", line));
                     }
                     elements.push(element);
                 }
                 Some(b"property") => {
                     let element = elements
                         .last_mut()
-                        .ok_or_else(|| malformed(at, "\"element\" first", line))?;
+                        .ok_or_else(|| syntax_error(at, "\"element\" first", line))?;
                     element.properties.push(read_property(words, at)?);
                 }
                 Some(b"end_header") => {
-                    let encoding = encoding.ok_or_else(|| malformed(at, "a \"format\" line before", line))?;
+                    let encoding =
+                        encoding.ok_or_else(|| syntax_error(at, "a \"format\" line before", line))?;
                     let header = Self {
                         encoding,
                         elements,
@@ -122,7 +123,7 @@ impl Header {
                     };
                     return Ok((header, lines));
                 }
-                Some(_) => return Err(malformed(at, "a line of a PLY header", line)),
+                Some(_) => return Err(syntax_error(at, "a line of a PLY header", line)),
             }
         }
         Err(ReadError::CutOff {
@@ -151,7 +152,7 @@ impl Header {
                 return Err(ReadError::TooFewBytes {
                     at,
                     what,
-                    promised,
+                    count: promised,
                     room: fit,
                 });
             }
@@ -177,7 +178,7 @@ fn read_encoding(word: Option<&[u8]>, at: Place) -> Result<Encoding, ReadError> 
         b"ascii" => Ok(Encoding::Ascii),
         b"binary_little_endian" => Ok(Encoding::Binary { big_endian: false }),
         b"binary_big_endian" => Ok(Encoding::Binary { big_endian: true }),
-        other => Err(malformed(
+        other => Err(syntax_error(
             at,
             "\"ascii\", \"binary_little_endian\" or \"binary_big_endian\"",
             other,
@@ -189,7 +190,7 @@ fn read_element<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Res
     let name = name(words.next());
     let count = words.next().unwrap_or_default();
     let parsed = std::str::from_utf8(count).ok().and_then(|text| text.parse().ok());
-    let count = parsed.ok_or_else(|| malformed(at, "the name of an element and its count", count))?;
+    let count = parsed.ok_or_else(|| syntax_error(at, "the name of an element and its count", count))?;
     Ok(Element {
         name,
         count,
@@ -201,7 +202,8 @@ fn read_element<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Res
 fn read_property<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Result<Property, ReadError> {
     let scalar = |word: Option<&[u8]>| {
         let word = word.unwrap_or_default();
-        Scalar::named(word).ok_or_else(|| malformed(at, "a type like \"int\", \"uchar\" or \"float\"", word))
+        Scalar::from_name(word)
+            .ok_or_else(|| syntax_error(at, "a type like \"int\", \"uchar\" or \"float\"", word))
     };
     let first = words.next();
     let kind = if first == Some(b"list") {

@@ -83,7 +83,7 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
         }
     }
     // Strips have no labels; combined with labelled faces, they would be labelled by chance.
-    let mut found = labels.found;
+    let mut found = labels.layers;
     found.retain(|(_, labels)| labels.len() == polygons.n_faces());
     let mut loaded = polygons.finish(Format::Ply, found)?;
     loaded.notes.extend(labels.note);
@@ -96,14 +96,14 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
 
 /// Properties of the channels of a colour; `None` if red, green or blue is missing.
 fn color_properties(element: &Element) -> Option<[Option<usize>; 4]> {
-    let found = COLOR_NAMES.map(|names| names.map(|name| scalar_named(element, name)));
+    let found = COLOR_NAMES.map(|names| names.map(|name| find_scalar(element, name)));
     found
         .into_iter()
         .find(|channels| channels[..3].iter().all(Option::is_some))
 }
 
 /// Finds the scalar property called `name`.
-fn scalar_named(element: &Element, name: &str) -> Option<usize> {
+fn find_scalar(element: &Element, name: &str) -> Option<usize> {
     let mut properties = element.properties.iter();
     properties.position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
 }
@@ -111,7 +111,7 @@ fn scalar_named(element: &Element, name: &str) -> Option<usize> {
 /// Labels of the faces, and a note about them for the user.
 #[derive(Default)]
 struct FaceLabels {
-    found: Vec<(LabelSource, Vec<i64>)>,
+    layers: Vec<(LabelSource, Vec<i64>)>,
     note: Option<String>,
 }
 
@@ -122,7 +122,7 @@ fn read_points(
     polygons: &mut Polygons,
 ) -> Result<Channels, ReadError> {
     for name in ["x", "y", "z"] {
-        if scalar_named(element, name).is_none() {
+        if find_scalar(element, name).is_none() {
             return Err(ReadError::Unsupported {
                 what: "a PLY file whose points lack x, y or z",
                 at: element.at,
@@ -168,7 +168,7 @@ fn read_faces(
     polygons: &mut Polygons,
 ) -> Result<FaceLabels, ReadError> {
     let corners_property = corners_property(element, "a PLY file whose faces lack vertex_indices")?;
-    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(element, name));
+    let label_property = LABEL_NAMES.iter().find_map(|name| find_scalar(element, name));
     let channels = color_properties(element);
     let channel_of = |i: usize| channels?.iter().position(|&property| property == Some(i));
 
@@ -208,7 +208,7 @@ fn read_faces(
         found.extend(whole.map(|labels| (LabelSource::Property, labels)));
     }
     found.extend(channels.map(|_| (LabelSource::Color, colors)));
-    Ok(FaceLabels { found, note })
+    Ok(FaceLabels { layers: found, note })
 }
 
 /// Note on unusual labels of a property. `labels` is `None` if some are no whole numbers.

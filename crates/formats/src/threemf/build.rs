@@ -7,9 +7,9 @@ use glam::DAffine3;
 use super::super::assembly::{Occurrence, Part, occurrences};
 use super::super::paint::{self, Painted};
 use super::super::polygons::{Numbering, divides};
-use super::super::select::listed;
+use super::super::select::list_names;
 use super::super::{Cutter, FileObject, FilePlate, Format, LabelSource, Labelling, Loaded, Place, ReadError};
-use super::model::{Item, Model, Object, Property};
+use super::model::{GroupEntry, Item, Model, Object};
 use super::role::{Role, Usage};
 use super::settings::{ObjectSettings, Settings};
 use shellock_geom::{TriMesh, Vec3};
@@ -26,10 +26,10 @@ pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadErr
     for occurrence in &found {
         flat.add(&build, occurrence)?;
     }
-    if !model.converted.is_empty() {
+    if !model.other_units.is_empty() {
         notes.push(format!(
             "parts of the file in another unit than its root, all brought to the root's: {}",
-            listed(&model.converted)
+            list_names(&model.other_units)
         ));
     }
     notes.extend(flat.notes(&build));
@@ -53,7 +53,7 @@ struct Build<'a> {
 struct Body<'a> {
     object: &'a Object,
     settings: Option<&'a ObjectSettings>,
-    painted: Painted,
+    surface: Painted,
     /// Volume of each triangle of the object.
     volume_of: Vec<u16>,
     /// Set of each triangle of the object, −1 for none; empty if there are no sets.
@@ -111,9 +111,9 @@ impl<'a> Build<'a> {
             let part = self.find(&component.path, component.id)?;
             Ok(Occurrence {
                 part,
-                placed: component.placed,
+                transform: component.transform,
                 // A name shown by a slicer takes precedence over that of the object.
-                said: self.bodies[part].usage().with(usage),
+                attribute: self.bodies[part].usage().with(usage),
             })
         };
         let children = components.iter().zip(usages).map(child);
@@ -143,10 +143,10 @@ impl<'a> Build<'a> {
 
     /// The objects that are built, and a note where the file does not say which.
     fn roots(&self) -> Result<(Vec<Occurrence<Usage<'_>>>, Vec<String>), ReadError> {
-        let root = |part: usize, placed: DAffine3, item: usize| Occurrence {
+        let root = |part: usize, transform: DAffine3, item: usize| Occurrence {
             part,
-            placed,
-            said: Usage {
+            transform,
+            attribute: Usage {
                 item: item as u32,
                 ..self.bodies[part].usage()
             },
@@ -157,8 +157,8 @@ impl<'a> Build<'a> {
                 continue;
             }
             let part = self.find(&item.component.path, item.component.id)?;
-            let mut of_item = root(part, item.component.placed, number);
-            of_item.said = of_item.said.with(Usage {
+            let mut of_item = root(part, item.component.transform, number);
+            of_item.attribute = of_item.attribute.with(Usage {
                 role: item.role.unwrap_or(Role::Body),
                 extruder: item.extruder,
                 ..Usage::PLAIN
@@ -190,7 +190,7 @@ impl<'a> Body<'a> {
         Ok(Self {
             object,
             settings,
-            painted,
+            surface: painted,
             volume_of: settings.map_or_else(Vec::new, |s| s.of_triangles(object.id, n_triangles)),
             set_of: sets(object),
         })
@@ -233,7 +233,7 @@ impl<'a> Body<'a> {
     /// visited.
     fn n_triangles(&self) -> usize {
         let is_met = self.unread_shape().is_some();
-        self.painted.mesh.triangles.len().max(usize::from(is_met))
+        self.surface.mesh.triangles.len().max(usize::from(is_met))
     }
 
     /// Name of an unsupported shape in the object.
@@ -288,7 +288,7 @@ struct Flat {
     set: Vec<i64>,
     object: Vec<i64>,
     colors: Numbering<Option<Option<String>>>,
-    materials: Numbering<Option<Property>>,
+    materials: Numbering<Option<GroupEntry>>,
     set_numbers: Numbering<Option<(usize, i64)>>,
     objects: Vec<FileObject>,
     cutters: Vec<Cutter>,
@@ -304,7 +304,11 @@ struct Flat {
 impl Flat {
     /// Adds the triangles of an occurrence.
     fn add(&mut self, build: &Build, occurrence: &Occurrence<Usage>) -> Result<(), ReadError> {
-        let Occurrence { part, placed, said } = *occurrence;
+        let Occurrence {
+            part,
+            transform,
+            attribute: said,
+        } = *occurrence;
         let body = &build.bodies[part];
         let is_solid = matches!(said.role, Role::Body | Role::Negative);
         if let Some(shape) = body.unread_shape().filter(|_| is_solid) {
@@ -315,12 +319,12 @@ impl Flat {
         }
         self.unknown
             .extend(body.object.unknown.clone().filter(|_| is_solid));
-        let points = moved(build.model, &body.painted.mesh, placed)?;
-        let is_mirror = placed.matrix3.determinant() < 0.0;
+        let points = transform_points(build.model, &body.surface.mesh, transform)?;
+        let is_mirror = transform.matrix3.determinant() < 0.0;
         let (mut of_body, mut last_source) = (Vec::new(), None);
         let mut of_cutters: BTreeMap<String, Vec<[u32; 3]>> = BTreeMap::new();
-        for (place, &[a, b, c]) in body.painted.mesh.triangles.iter().enumerate() {
-            let source = body.painted.source[place];
+        for (place, &[a, b, c]) in body.surface.mesh.triangles.iter().enumerate() {
+            let source = body.surface.source[place];
             let usage = said.with(body.usage_of(source));
             let triangle = if is_mirror { [a, c, b] } else { [a, b, c] };
             match usage.role {
@@ -360,7 +364,7 @@ impl Flat {
     /// Records the labels of the triangle at `place` of a body, which was just added.
     fn divide(&mut self, build: &Build, part: usize, place: usize, usage: Usage) {
         let (model, body) = (build.model, &build.bodies[part]);
-        let source = body.painted.source[place];
+        let source = body.surface.source[place];
         self.file_face.push(self.n_faces - 1);
         let property = body.object.property(source);
         self.n_unnamed += usize::from(property.is_some_and(|p| !model.has(p)));
@@ -369,8 +373,8 @@ impl Flat {
             Some(property) if model.color_groups.contains_key(&property.group()) => (Some(property), None),
             other => (None, other),
         };
-        let value = |p: Property| model.color_groups[&p.group()].get(p.index as usize).cloned();
-        let extruder = match body.painted.colors[place] {
+        let value = |p: GroupEntry| model.color_groups[&p.group()].get(p.index as usize).cloned();
+        let extruder = match body.surface.colors[place] {
             0 => usage.extruder.unwrap_or(FIRST_EXTRUDER),
             color => color,
         };
@@ -387,7 +391,7 @@ impl Flat {
     fn notes(&self, build: &Build) -> Vec<String> {
         let mut notes = Vec::new();
         for (role, names) in &self.left_out {
-            notes.push(format!("left out as {}: {}", role.words(), listed(names)));
+            notes.push(format!("left out as {}: {}", role.words(), list_names(names)));
         }
         if self.n_unnamed > 0 {
             notes.push(format!(
@@ -400,7 +404,10 @@ impl Flat {
             notes.push("the file's texture is not used: it divides nothing".to_owned());
         }
         if !self.unknown.is_empty() {
-            notes.push(format!("elements that are not read: {}", listed(&self.unknown)));
+            notes.push(format!(
+                "elements that are not read: {}",
+                list_names(&self.unknown)
+            ));
         }
         if build.model.objects.is_empty() {
             notes.push("the file has no objects".to_owned());
@@ -414,7 +421,7 @@ impl Flat {
             if let Some((role, names)) = self.left_out.first_key_value() {
                 return Err(ReadError::NothingPrinted {
                     what: role.words(),
-                    names: listed(names),
+                    names: list_names(names),
                 });
             }
             return Err(ReadError::NoTriangles {
@@ -439,7 +446,7 @@ impl Flat {
             file_face: self.file_face,
             format: Format::ThreeMf,
             unit_mm: Some(model.unit_mm),
-            unit_is_stated: model.unit_is_stated,
+            has_unit: model.has_unit,
             objects: self.objects,
             empty_plates,
             cutters: self.cutters,
@@ -471,8 +478,12 @@ impl Build<'_> {
 }
 
 /// Transforms the points of an object; an error if some are not finite.
-fn moved(model: &Model, mesh: &TriMesh, placed: DAffine3) -> Result<Vec<Vec3>, ReadError> {
-    let points: Vec<Vec3> = mesh.points.iter().map(|&p| placed.transform_point3(p)).collect();
+fn transform_points(model: &Model, mesh: &TriMesh, transform: DAffine3) -> Result<Vec<Vec3>, ReadError> {
+    let points: Vec<Vec3> = mesh
+        .points
+        .iter()
+        .map(|&p| transform.transform_point3(p))
+        .collect();
     if points.iter().all(|p| p.is_finite()) {
         return Ok(points);
     }

@@ -63,7 +63,10 @@ pub(super) fn is_foreign(namespace: &str) -> bool {
 /// Refuses a part that demands an extension that is not read.
 ///
 /// `required` holds prefixes, and `namespaces` their namespaces.
-pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, String>) -> Result<(), ReadError> {
+pub(super) fn check_requirements(
+    required: &str,
+    namespaces: &BTreeMap<String, String>,
+) -> Result<(), ReadError> {
     for prefix in required.split_whitespace() {
         // Some programs give the namespace itself.
         let namespace = namespaces.get(prefix).map_or(prefix, String::as_str);
@@ -74,14 +77,14 @@ pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, Strin
         let name = UNREAD
             .iter()
             .find(|(part, _)| folded.contains(part))
-            .map_or_else(|| shown(namespace), |(_, name)| (*name).to_owned());
+            .map_or_else(|| shorten(namespace), |(_, name)| (*name).to_owned());
         return Err(ReadError::Extension { name });
     }
     Ok(())
 }
 
 /// Shortens a namespace for a message.
-fn shown(namespace: &str) -> String {
+fn shorten(namespace: &str) -> String {
     const MOST_CHARS: usize = 80;
     namespace.chars().take(MOST_CHARS).collect()
 }
@@ -109,7 +112,7 @@ mod tests {
         ]
         .map(|(prefix, namespace)| (prefix.to_owned(), namespace.to_owned()))
         .into();
-        let name = |required: &str| match check_required(required, &namespaces) {
+        let name = |required: &str| match check_requirements(required, &namespaces) {
             Err(ReadError::Extension { name }) => Some(name),
             _ => None,
         };

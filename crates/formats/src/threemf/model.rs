@@ -19,7 +19,7 @@ pub(super) struct Model {
     /// Length of the root's unit, in which all lengths are; mm.
     pub(super) unit_mm: f64,
     /// True if the root states its unit. Otherwise the unit is the format's default.
-    pub(super) unit_is_stated: bool,
+    pub(super) has_unit: bool,
     pub(super) objects: Vec<Object>,
     /// Items of the build.
     pub(super) items: Vec<Item>,
@@ -30,7 +30,7 @@ pub(super) struct Model {
     /// Groups that are texture coordinates, by part and id.
     pub(super) textures: BTreeSet<(u32, u32)>,
     /// Names of parts in another unit than the root's.
-    pub(super) converted: BTreeSet<String>,
+    pub(super) other_units: BTreeSet<String>,
     /// Names of the parts read, in order; the root is the first.
     pub(super) parts: Vec<String>,
 }
@@ -53,9 +53,9 @@ pub(super) struct Object {
     pub(super) paint_text: String,
     pub(super) components: Vec<Component>,
     /// Property of all triangles without one of their own.
-    pub(super) whole: Option<Property>,
+    pub(super) whole: Option<GroupEntry>,
     /// Property by triangle, ascending.
-    pub(super) properties: Vec<(u32, Property)>,
+    pub(super) properties: Vec<(u32, GroupEntry)>,
     /// Named sets of triangles: first and last triangle, and the set, from 0.
     pub(super) sets: Vec<(u32, u32, u32)>,
     /// Extension that gives the object an unsupported shape.
@@ -68,7 +68,7 @@ pub(super) struct Object {
 pub(super) struct Component {
     pub(super) path: String,
     pub(super) id: u32,
-    pub(super) placed: DAffine3,
+    pub(super) transform: DAffine3,
 }
 
 /// An object of the build.
@@ -84,13 +84,13 @@ pub(super) struct Item {
 
 /// An entry of a material or colour group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Property {
+pub(super) struct GroupEntry {
     pub(super) part: u32,
     pub(super) group: u32,
     pub(super) index: u32,
 }
 
-impl Property {
+impl GroupEntry {
     /// Returns the part and the id of the group.
     pub(super) fn group(self) -> (u32, u32) {
         (self.part, self.group)
@@ -106,7 +106,7 @@ impl Object {
     }
 
     /// Returns the material or colour of a triangle.
-    pub(super) fn property(&self, face: u32) -> Option<Property> {
+    pub(super) fn property(&self, face: u32) -> Option<GroupEntry> {
         let own = self.properties.binary_search_by_key(&face, |(f, _)| *f);
         own.map_or(self.whole, |at| Some(self.properties[at].1))
     }
@@ -136,7 +136,7 @@ impl Model {
     }
 
     /// Returns true if the file has the colour, or the group of the material.
-    pub(super) fn has(&self, property: Property) -> bool {
+    pub(super) fn has(&self, property: GroupEntry) -> bool {
         let group = property.group();
         let n_colors = self.color_groups.get(&group).map(Vec::len);
         self.groups.contains(&group) && n_colors.is_none_or(|n| (property.index as usize) < n)

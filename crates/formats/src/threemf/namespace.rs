@@ -8,7 +8,7 @@ use super::extension;
 #[derive(Default)]
 pub(super) struct Namespaces {
     /// For each prefix its declarations, the innermost last; the default namespace has the prefix "".
-    declared: BTreeMap<String, Vec<Declaration>>,
+    declarations: BTreeMap<String, Vec<Declaration>>,
     /// Prefixes in the order in which they were declared, each with the depth of its element.
     order: Vec<(usize, String)>,
     /// The namespace of the part's outermost element, which counts as known: some writers misspell it.
@@ -23,15 +23,15 @@ struct Declaration {
 impl Namespaces {
     /// Adds the declarations of the element at `depth`. The first element of a part defines the part's own
     /// namespace by its `prefix`.
-    pub(super) fn open(&mut self, depth: usize, prefix: &str, declared: BTreeMap<String, String>) {
+    pub(super) fn open(&mut self, depth: usize, prefix: &str, declarations: BTreeMap<String, String>) {
         if self.own.is_none() {
-            self.own = Some(declared.get(prefix).cloned().unwrap_or_default());
+            self.own = Some(declarations.get(prefix).cloned().unwrap_or_default());
         }
-        for (prefix, namespace) in declared {
+        for (prefix, namespace) in declarations {
             let is_own = self.own.as_ref() == Some(&namespace);
             let is_foreign = !is_own && extension::is_foreign(&namespace);
             self.order.push((depth, prefix.clone()));
-            self.declared.entry(prefix).or_default().push(Declaration {
+            self.declarations.entry(prefix).or_default().push(Declaration {
                 namespace,
                 is_foreign,
             });
@@ -41,7 +41,7 @@ impl Namespaces {
     /// Removes the declarations of the element at `depth`.
     pub(super) fn close(&mut self, depth: usize) {
         while let Some((_, prefix)) = self.order.pop_if(|(of, _)| *of >= depth) {
-            if let Some(declarations) = self.declared.get_mut(&prefix) {
+            if let Some(declarations) = self.declarations.get_mut(&prefix) {
                 declarations.pop();
             }
         }
@@ -51,7 +51,7 @@ impl Namespaces {
     /// Undeclared prefixes are not foreign, because some writers forget the declaration.
     pub(super) fn is_foreign(&self, name: &str) -> bool {
         let prefix = prefix(name);
-        self.declared
+        self.declarations
             .get(prefix)
             .and_then(|declarations| declarations.last())
             .is_some_and(|declaration| declaration.is_foreign)
@@ -63,7 +63,7 @@ impl Namespaces {
             let last = declarations.last()?;
             Some((prefix.clone(), last.namespace.clone()))
         };
-        self.declared.iter().filter_map(innermost).collect()
+        self.declarations.iter().filter_map(innermost).collect()
     }
 }
 

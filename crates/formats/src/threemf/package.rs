@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 
 use super::super::ReadError;
-use super::super::container::{archive, limit, read_bounded, unopened};
+use super::super::container::{archive, limit, opening_error, read_up_to};
 use super::xml;
 
 /// Root part, which describes the build, unless the package names another.
@@ -21,7 +21,7 @@ pub(super) struct Package<'a> {
     archive: zip::ZipArchive<Cursor<&'a [u8]>>,
     /// Index in the archive by [`key`], below the common folder.
     places: BTreeMap<String, usize>,
-    bytes_left: u64,
+    byte_budget: u64,
 }
 
 impl<'a> Package<'a> {
@@ -42,7 +42,7 @@ impl<'a> Package<'a> {
         Ok(Self {
             archive,
             places,
-            bytes_left: limit(bytes.len()),
+            byte_budget: limit(bytes.len()),
         })
     }
 
@@ -51,9 +51,9 @@ impl<'a> Package<'a> {
         let Some(&place) = self.places.get(&key(name)) else {
             return Ok(None);
         };
-        let file = self.archive.by_index(place).map_err(unopened)?;
-        let bytes = read_bounded(file, self.bytes_left)?;
-        self.bytes_left -= bytes.len() as u64;
+        let file = self.archive.by_index(place).map_err(opening_error)?;
+        let bytes = read_up_to(file, self.byte_budget)?;
+        self.byte_budget -= bytes.len() as u64;
         Ok(Some(xml::text(bytes)))
     }
 
@@ -69,7 +69,7 @@ impl<'a> Package<'a> {
     }
 
     /// The name of a part as the archive has it.
-    pub(super) fn shown(&self, name: &str) -> String {
+    pub(super) fn archive_name(&self, name: &str) -> String {
         let place = self.places.get(&key(name));
         let shown = place.and_then(|&place| self.archive.name_for_index(place)?.ok());
         shown.map_or_else(|| name.to_owned(), std::borrow::Cow::into_owned)
@@ -94,10 +94,7 @@ impl<'a> Package<'a> {
 
 /// Normalises a reference to a part: without %XX, with "/" between folders, from the root.
 pub(super) fn path(name: &str) -> String {
-    decoded(name)
-        .replace('\\', "/")
-        .trim_start_matches('/')
-        .to_owned()
+    decode(name).replace('\\', "/").trim_start_matches('/').to_owned()
 }
 
 /// Key of a part's name: equal for names of the same part, which may differ in case.
@@ -106,7 +103,7 @@ fn key(name: &str) -> String {
 }
 
 /// Replaces each %XX in `name` by its byte.
-fn decoded(name: &str) -> String {
+fn decode(name: &str) -> String {
     let hex = |b: u8| char::from(b).to_digit(16);
     let (bytes, mut out) = (name.as_bytes(), Vec::with_capacity(name.len()));
     let mut at = 0;

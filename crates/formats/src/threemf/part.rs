@@ -7,7 +7,7 @@ use quick_xml::events::BytesStart;
 
 use super::super::ReadError;
 use super::extension;
-use super::model::{Component, Item, Model, Object, Property};
+use super::model::{Component, GroupEntry, Item, Model, Object};
 use super::package;
 use super::role::{Role, is_yes};
 use super::xml::{Elements, Next, local, number};
@@ -35,7 +35,7 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
         first_object: model.objects.len(),
         model,
         ids: BTreeSet::new(),
-        open: Open::default(),
+        open: OpenElements::default(),
     };
     let mut has_model = false;
     while let Some(next) = reader.elements.next()? {
@@ -69,12 +69,12 @@ struct PartReader<'a, 'm> {
     first_object: usize,
     /// Ids of the objects so far.
     ids: BTreeSet<u32>,
-    open: Open,
+    open: OpenElements,
 }
 
 /// Elements that are open at present.
 #[derive(Default)]
-struct Open {
+struct OpenElements {
     /// Local names of all open elements.
     path: Vec<String>,
     color_group: Option<(u32, Vec<String>)>,
@@ -199,7 +199,7 @@ impl PartReader<'_, '_> {
 
     fn read_model(&mut self, element: &BytesStart) -> Result<(), ReadError> {
         let namespaces = self.elements.namespaces();
-        extension::check_required(&self.elements.string(element, "requiredextensions")?, &namespaces)?;
+        extension::check_requirements(&self.elements.string(element, "requiredextensions")?, &namespaces)?;
         let unit = self.elements.string(element, "unit")?;
         let unit_mm = match unit.as_str() {
             "micron" => 1e-3,
@@ -211,13 +211,13 @@ impl PartReader<'_, '_> {
             _ => return Err(self.elements.error("the unit is none of those that 3MF has")),
         };
         if self.number == 0 {
-            (self.model.unit_mm, self.model.unit_is_stated) = (unit_mm, !unit.is_empty());
+            (self.model.unit_mm, self.model.has_unit) = (unit_mm, !unit.is_empty());
         } else if unit_mm != self.model.unit_mm {
             // The unit is an attribute of a part's own `model` and holds for all vertices and measurements in
             // it (core specification 1.3, section 3.4); no part takes over that of another, and without one
             // it is the millimetre.
             self.scale = unit_mm / self.model.unit_mm;
-            self.model.converted.insert(self.name.to_owned());
+            self.model.other_units.insert(self.name.to_owned());
         }
         Ok(())
     }
@@ -262,12 +262,12 @@ impl PartReader<'_, '_> {
         Ok(object)
     }
 
-    fn property(&self, group: u32, index: u32) -> Property {
+    fn property(&self, group: u32, index: u32) -> GroupEntry {
         let part = self.number;
         // The index is a texture coordinate, not a material.
         let is_texture = self.model.textures.contains(&(part, group));
         let index = if is_texture { 0 } else { index };
-        Property { part, group, index }
+        GroupEntry { part, group, index }
     }
 
     fn read_vertex(&self, element: &BytesStart) -> Result<Vec3, ReadError> {
@@ -344,19 +344,19 @@ impl PartReader<'_, '_> {
         let mut component = Component {
             path: self.name.to_owned(),
             id: 0,
-            placed: DAffine3::IDENTITY,
+            transform: DAffine3::IDENTITY,
         };
         self.elements.attributes(element, |name, value| {
             match name {
                 "objectid" => component.id = number(name, value)?,
-                "transform" => component.placed = transform(value)?,
+                "transform" => component.transform = transform(value)?,
                 "path" => component.path = package::path(value),
                 _ => {}
             }
             Ok(())
         })?;
         // What it moves is in the root's unit, too: its axes turn and stretch, which has no unit.
-        component.placed.translation *= self.scale;
+        component.transform.translation *= self.scale;
         Ok(component)
     }
 

@@ -60,7 +60,7 @@ pub(super) struct Plate {
 
 /// Elements that are open at present.
 #[derive(Default)]
-struct Open {
+struct OpenSettings {
     object: Option<u32>,
     in_volume: bool,
     plate: Option<Plate>,
@@ -77,7 +77,7 @@ impl Settings {
         let mut settings = Self::default();
         for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {
             let text = package.text(&name)?.unwrap_or_default();
-            let part = package.shown(&name);
+            let part = package.archive_name(&name);
             settings.read_file(&part, &text).map_err(|error| match error {
                 ReadError::Xml { part, at, reason } => ReadError::Settings { part, at, reason },
                 other => other,
@@ -104,7 +104,7 @@ impl Settings {
 
     fn read_file(&mut self, name: &str, text: &str) -> Result<(), ReadError> {
         let mut elements = Elements::of(name, text);
-        let mut open = Open::default();
+        let mut open = OpenSettings::default();
         while let Some(next) = elements.next()? {
             match next {
                 Next::Begin(element) => self.begin(&elements, &element, &mut open)?,
@@ -115,7 +115,12 @@ impl Settings {
         Ok(())
     }
 
-    fn begin(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) -> Result<(), ReadError> {
+    fn begin(
+        &mut self,
+        elements: &Elements,
+        element: &BytesStart,
+        open: &mut OpenSettings,
+    ) -> Result<(), ReadError> {
         let attribute = |name| attribute::<u32>(elements, element, name);
         match element.local_name().as_ref() {
             "object" => {
@@ -145,7 +150,7 @@ impl Settings {
         Ok(())
     }
 
-    fn begin_volume(&mut self, of: Of, role: Role, open: &mut Open) {
+    fn begin_volume(&mut self, of: Of, role: Role, open: &mut OpenSettings) {
         let Some(object) = open.object.and_then(|id| self.objects.get_mut(&id)) else {
             return;
         };
@@ -158,7 +163,7 @@ impl Settings {
         open.in_volume = true;
     }
 
-    fn end(&mut self, name: &str, open: &mut Open) {
+    fn end(&mut self, name: &str, open: &mut OpenSettings) {
         match name {
             "object" => (open.object, open.in_volume) = (None, false),
             "volume" | "part" => open.in_volume = false,
@@ -172,7 +177,12 @@ impl Settings {
         }
     }
 
-    fn note(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) -> Result<(), ReadError> {
+    fn note(
+        &mut self,
+        elements: &Elements,
+        element: &BytesStart,
+        open: &mut OpenSettings,
+    ) -> Result<(), ReadError> {
         let (key, value) = key_and_value(elements, element)?;
         if let Some(plate) = &mut open.plate {
             plate.note(&key, &value, &mut open.instance);

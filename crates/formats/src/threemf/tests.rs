@@ -1,6 +1,6 @@
 use std::io::{Cursor, Write as _};
 
-use super::super::tests::assert_told;
+use super::super::tests::assert_note;
 use super::super::{Format, LabelSource, Loaded, ReadError, read_mesh};
 use super::package::USUAL_ROOT;
 use super::*;
@@ -151,11 +151,11 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
     );
     let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
-    assert_told(&loaded, "support");
+    assert_note(&loaded, "support");
     assert!(!loaded.notes.iter().any(|n| n.contains("does not have")));
     let none = resources.replace(r#"p1="1""#, r#"p1="2""#);
     let loaded = read_model(&none, r#"<item objectid="1"/>"#).unwrap();
-    assert_told(&loaded, "1 triangle(s) have a colour");
+    assert_note(&loaded, "1 triangle(s) have a colour");
     let materials = format!(r#"<basematerials id="5"/><object id="1" pid="5" pindex="0">{painted}</object>"#);
     let loaded = read_model(&materials, r#"<item objectid="1"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 1, 0, 0][..]));
@@ -170,7 +170,7 @@ fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
     )
     .unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 4);
-    assert_told(&loaded, "not to print");
+    assert_note(&loaded, "not to print");
     let alone = read_model(&resources, r#"<item objectid="2" printable="0"/>"#).unwrap();
     assert_eq!(alone.mesh.triangles.len(), 4);
 }
@@ -237,7 +237,7 @@ fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
     );
     let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (PRUSA, prusa)]), None).unwrap();
     assert_eq!(loaded.face_labels(), Some(&[3, 2, 3, 3][..]));
-    assert_told(&loaded, "left out as modifiers of the slicer: a part of object 1");
+    assert_note(&loaded, "left out as modifiers of the slicer: a part of object 1");
 
     let parts = format!(
         r#"{}{}<object id="3"><components><component objectid="1"/><component objectid="2"/></components></object>"#,

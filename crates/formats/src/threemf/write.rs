@@ -19,7 +19,7 @@ pub struct NamedObject<'a> {
     /// Mesh of the object, mm.
     pub mesh: &'a TriMesh,
     /// Rotation on the plate, as images of the x, y and z axes; none if `None`.
-    pub turned: Option<[[f64; 3]; 3]>,
+    pub rotation: Option<[[f64; 3]; 3]>,
     /// Translation after the rotation, mm.
     pub moved_mm: [f64; 3],
 }
@@ -141,8 +141,8 @@ fn model_xml(objects: &[NamedObject]) -> String {
     xml.push_str("</resources>\n<build>\n");
     for (i, object) in objects.iter().enumerate() {
         add(&mut xml, format_args!("<item objectid=\"{}\"", object_id(i)));
-        if object.turned.is_some() || object.moved_mm != [0.0; 3] {
-            let [[a, b, c], [d, e, f], [g, h, i]] = object.turned.unwrap_or(UNTURNED);
+        if object.rotation.is_some() || object.moved_mm != [0.0; 3] {
+            let [[a, b, c], [d, e, f], [g, h, i]] = object.rotation.unwrap_or(UNTURNED);
             let [x, y, z] = object.moved_mm;
             add(
                 &mut xml,

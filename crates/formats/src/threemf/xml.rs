@@ -91,7 +91,7 @@ impl<'a> Elements<'a> {
                 }
                 // Nearly all elements declare nothing.
                 if self.depth == 1 || start.contains("xmlns") {
-                    let declared = self.declared(start)?;
+                    let declared = self.declarations(start)?;
                     let name = start.name();
                     self.namespaces.open(self.depth, prefix(name.as_ref()), declared);
                 }
@@ -173,7 +173,7 @@ impl<'a> Elements<'a> {
     }
 
     /// The namespaces that `element` declares, by prefix; the default one has the prefix "".
-    fn declared(&self, element: &BytesStart) -> Result<BTreeMap<String, String>, ReadError> {
+    fn declarations(&self, element: &BytesStart) -> Result<BTreeMap<String, String>, ReadError> {
         let mut found = BTreeMap::new();
         self.raw_attributes(element, |name, value| {
             if let Some(prefix) = declared_prefix(name) {
@@ -206,7 +206,7 @@ impl<'a> Elements<'a> {
             let value = attribute.value.as_ref();
             let name = attribute.key.into_inner();
             if value.contains('&') {
-                let value = coded(value);
+                let value = encode_ampersands(value);
                 let value = quick_xml::escape::unescape(&value).map_err(|e| self.error(e))?;
                 take(name, &value).map_err(|e| self.error(e))?;
             } else {
@@ -228,7 +228,7 @@ impl<'a> Elements<'a> {
 }
 
 /// `value` with a code for each "&" that begins none: writers forget it, and it can mean nothing else.
-fn coded(value: &str) -> String {
+fn encode_ampersands(value: &str) -> String {
     let mut pieces = value.split('&');
     let mut out = pieces.next().unwrap_or_default().to_owned();
     for piece in pieces {

@@ -24,7 +24,7 @@ pub struct Inspection {
     /// Defects of the mesh's edges.
     pub edges: Edges,
     /// Points where several fans of triangles touch.
-    pub pinched: Spots,
+    pub pinches: Spots,
     /// Groups of triangles connected over edges, largest bounding box first.
     pub bodies: Vec<ClosedPart>,
 }
@@ -38,9 +38,9 @@ pub struct Edges {
     /// touch.
     pub n_holes: usize,
     /// Edges with more than two triangles.
-    pub shared: Spots,
+    pub non_manifold: Spots,
     /// Edges whose two triangles face opposite ways.
-    pub turned: Spots,
+    pub flips: Spots,
     /// Number of triangles over the same three points as an earlier triangle.
     pub n_copies: usize,
 }
@@ -48,7 +48,7 @@ pub struct Edges {
 impl Edges {
     /// Returns true if each edge joins two triangles of the same orientation.
     pub fn is_closed(&self) -> bool {
-        self.open.count == 0 && self.shared.count == 0 && self.turned.count == 0
+        self.open.count == 0 && self.non_manifold.count == 0 && self.flips.count == 0
     }
 }
 
@@ -106,7 +106,7 @@ pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
 pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
     let Inspection {
         edges,
-        pinched,
+        pinches,
         bodies,
     } = inspection;
     let at = |spots: &Spots| (spots.count, spots.first);
@@ -117,14 +117,14 @@ pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize
             n_faces: n_faces + n_collapsed,
         });
     }
-    if let (count @ 1.., at) = at(&edges.shared) {
+    if let (count @ 1.., at) = at(&edges.non_manifold) {
         return Err(InputError::Shared {
             count,
             at,
             n_copies: edges.n_copies,
         });
     }
-    if let (count @ 1.., at) = at(&edges.turned) {
+    if let (count @ 1.., at) = at(&edges.flips) {
         return Err(InputError::Turned { count, at });
     }
     if let (count @ 1.., at) = at(&edges.open) {
@@ -140,7 +140,7 @@ pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize
     if bodies.len() > 1 {
         return Err(InputError::Bodies(bodies.clone()));
     }
-    if let (count @ 1.., at) = at(pinched) {
+    if let (count @ 1.., at) = at(pinches) {
         return Err(InputError::Pinched { count, at });
     }
     match bodies.first() {
@@ -184,15 +184,15 @@ pub fn inspect(mesh: &TriMesh) -> Inspection {
     let mut corners = connected_corners(mesh, &sides);
     Inspection {
         edges: count_edges(mesh, &sides),
-        pinched: pinched(mesh, &mut corners),
+        pinches: find_pinches(mesh, &mut corners),
         bodies: bodies(mesh, &mut faces),
     }
 }
 
 /// Groups of triangles connected over edges.
-fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
+fn connected_faces(mesh: &TriMesh, sides: &[TriangleSide]) -> Groups {
     let mut faces = Groups::of(mesh.triangles.len());
-    for edge in sides.chunk_by(Side::same_edge) {
+    for edge in sides.chunk_by(TriangleSide::same_edge) {
         edge[1..]
             .iter()
             .for_each(|side| faces.unite(edge[0].face(), side.face()));
@@ -201,9 +201,9 @@ fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
 }
 
 /// Groups of corners at the same point whose triangles are connected over edges: the fans.
-fn connected_corners(mesh: &TriMesh, sides: &[Side]) -> Groups {
+fn connected_corners(mesh: &TriMesh, sides: &[TriangleSide]) -> Groups {
     let mut corners = Groups::of(3 * mesh.triangles.len());
-    for edge in sides.chunk_by(Side::same_edge) {
+    for edge in sides.chunk_by(TriangleSide::same_edge) {
         for side in &edge[1..] {
             for end in [edge[0].low, edge[0].high] {
                 corners.unite(edge[0].corner_at(mesh, end), side.corner_at(mesh, end));
@@ -252,7 +252,9 @@ impl OpenEdge {
 /// All edges with one triangle, sorted by their points.
 pub(crate) fn open_edges(mesh: &TriMesh) -> Vec<OpenEdge> {
     let sides = sides(mesh);
-    let single = sides.chunk_by(Side::same_edge).filter(|edge| edge.len() == 1);
+    let single = sides
+        .chunk_by(TriangleSide::same_edge)
+        .filter(|edge| edge.len() == 1);
     single
         .map(|edge| {
             let (face, side) = (edge[0].face(), (edge[0].corner % 3) as u8);
@@ -274,13 +276,13 @@ pub(crate) fn inspect_edges(mesh: &TriMesh) -> Edges {
 
 /// Side of a triangle, from corner `corner` (three times the face, plus 0, 1 or 2) to the next one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Side {
+pub(crate) struct TriangleSide {
     pub(crate) low: u32,
     pub(crate) high: u32,
     pub(crate) corner: u32,
 }
 
-impl Side {
+impl TriangleSide {
     pub(crate) fn same_edge(&self, other: &Self) -> bool {
         (self.low, self.high) == (other.low, other.high)
     }
@@ -305,10 +307,10 @@ impl Side {
 }
 
 /// All sides of all triangles, with sides of the same edge next to each other.
-pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
+pub(crate) fn sides(mesh: &TriMesh) -> Vec<TriangleSide> {
     let all = || {
         mesh.triangles.iter().zip(0_u32..).flat_map(|(&[a, b, c], face)| {
-            [(a, b, 0), (b, c, 1), (c, a, 2)].map(|(from, to, k)| Side {
+            [(a, b, 0), (b, c, 1), (c, a, 2)].map(|(from, to, k)| TriangleSide {
                 low: from.min(to),
                 high: from.max(to),
                 corner: 3 * face + k,
@@ -324,7 +326,7 @@ pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
     }
     let mut next = begin.clone();
     let mut sides = vec![
-        Side {
+        TriangleSide {
             low: 0,
             high: 0,
             corner: 0
@@ -341,11 +343,11 @@ pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
     sides
 }
 
-fn count_edges(mesh: &TriMesh, sides: &[Side]) -> Edges {
+fn count_edges(mesh: &TriMesh, sides: &[TriangleSide]) -> Edges {
     let mut edges = Edges::default();
     let mut open_ends = Vec::new();
     let mut has_shared = false;
-    for edge in sides.chunk_by(Side::same_edge) {
+    for edge in sides.chunk_by(TriangleSide::same_edge) {
         let [low, high] = [edge[0].low, edge[0].high];
         let middle = || 0.5 * (mesh.points[low as usize] + mesh.points[high as usize]);
         match edge {
@@ -354,9 +356,9 @@ fn count_edges(mesh: &TriMesh, sides: &[Side]) -> Edges {
                 open_ends.push((one.low, one.high));
             }
             [one, other] if low != high && one.runs_up(mesh) != other.runs_up(mesh) => {}
-            [_, _] if low != high => edges.turned.add(middle()),
+            [_, _] if low != high => edges.flips.add(middle()),
             _ => {
-                edges.shared.add(middle());
+                edges.non_manifold.add(middle());
                 has_shared = true;
             }
         }
@@ -385,7 +387,7 @@ fn count_copies(mesh: &TriMesh) -> usize {
     corner_sets.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
 
-fn pinched(mesh: &TriMesh, corners: &mut Groups) -> Spots {
+fn find_pinches(mesh: &TriMesh, corners: &mut Groups) -> Spots {
     let mut fan_of = vec![None; mesh.points.len()];
     let mut is_pinched = vec![false; mesh.points.len()];
     for (&point, corner) in mesh.triangles.as_flattened().iter().zip(0_u32..) {

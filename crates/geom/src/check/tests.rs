@@ -1,5 +1,5 @@
 use super::*;
-use crate::samples::{both, cube, flipped, unwelded};
+use crate::samples::{both, cube, flip, unweld};
 
 fn error(mesh: &TriMesh) -> InputError {
     into_solid(mesh).expect_err("the mesh is broken")
@@ -8,7 +8,7 @@ fn error(mesh: &TriMesh) -> InputError {
 #[test]
 fn a_cube_is_one_body_indexed_or_not() {
     let mesh = cube(Vec3::ONE, 2.0);
-    for mesh in [unwelded(&mesh), mesh] {
+    for mesh in [unweld(&mesh), mesh] {
         let (solid, kept_face) = into_solid(&mesh).unwrap();
         assert_eq!((solid.volume(), solid.mesh().points.len()), (8.0, 8));
         assert_eq!(kept_face, (0..12).collect::<Vec<_>>());
@@ -24,7 +24,7 @@ fn touching_along_an_edge_is_sound_as_indexed_and_broken_as_a_soup() {
     assert!(matches!(error(&mesh), InputError::Bodies(bodies) if bodies.len() == 2));
     let at = Vec3::new(1.0, 1.0, 0.5);
     assert_eq!(
-        error(&unwelded(&mesh)),
+        error(&unweld(&mesh)),
         InputError::Shared {
             count: 1,
             at,
@@ -35,7 +35,7 @@ fn touching_along_an_edge_is_sound_as_indexed_and_broken_as_a_soup() {
 
 #[test]
 fn bodies_are_counted_and_cavities_named() {
-    let cavity = both(cube(Vec3::ZERO, 4.0), flipped(cube(Vec3::ONE, 1.0)));
+    let cavity = both(cube(Vec3::ZERO, 4.0), flip(cube(Vec3::ONE, 1.0)));
     let InputError::Bodies(bodies) = error(&cavity) else {
         panic!("two surfaces")
     };
@@ -90,7 +90,7 @@ fn turned_doubled_and_inverted_triangles_are_told_apart() {
             ..
         }
     ));
-    assert_eq!(error(&flipped(cube(Vec3::ZERO, 1.0))), InputError::InsideOut);
+    assert_eq!(error(&flip(cube(Vec3::ZERO, 1.0))), InputError::InsideOut);
     assert_eq!(error(&TriMesh::default()), InputError::Empty);
 }
 
@@ -152,7 +152,7 @@ fn a_pinched_point_is_found() {
 
 #[test]
 fn loose_and_rounded_meshes_get_their_own_words() {
-    let mut cracked = unwelded(&cube(Vec3::ZERO, 1.0));
+    let mut cracked = unweld(&cube(Vec3::ZERO, 1.0));
     cracked
         .points
         .iter_mut()

@@ -26,9 +26,9 @@ type Pair = (u32, u32);
 /// A motion of one shape past another that is at rest.
 pub(super) struct Passage<'a> {
     /// Shape that moves past the other.
-    pub moving: &'a Shape,
+    pub mover: &'a Shape,
     /// Shape that is at rest.
-    pub fixed: &'a Shape,
+    pub obstacle: &'a Shape,
     /// Unit vector of the motion, or zero.
     pub along: Vec3,
     /// First and last travel, mm.
@@ -72,7 +72,7 @@ impl Passage<'_> {
                     .map(|(name, track)| (name, track, of_face)),
             );
         }
-        for face in self.swallowed(near, crossings) {
+        for face in self.find_faces_inside(near, crossings) {
             tracks.extend(self.tracks(face).map(|(name, track)| (name, track, &[][..])));
         }
         // Each triangle of an edge finds the same track, with the same crossings; one is enough.
@@ -88,7 +88,7 @@ impl Passage<'_> {
     /// Tracks of a triangle: paths of its three corners, named by the corner twice, and its edges at the
     /// first travel, named by their ends.
     fn tracks(&self, face: u32) -> impl Iterator<Item = ((u32, u32), Track)> {
-        let mesh = self.moving.solid.mesh();
+        let mesh = self.mover.solid.mesh();
         let t = mesh.triangles[face as usize];
         let [from, far] = self.travels;
         let at = move |v: u32, travel: f64| mesh.points[v as usize] + travel * self.along;
@@ -116,7 +116,7 @@ impl Passage<'_> {
 
     /// Parts of `track` that may be inside, given all triangles that cross it.
     fn parts_inside(&self, track: Track, crossed: &[(u32, u32)]) -> Vec<Track> {
-        let mesh = self.fixed.solid.mesh();
+        let mesh = self.obstacle.solid.mesh();
         let [p, q] = track.ends;
         let length_mm = p.distance(q);
         // Places where the track passes the surface, with two flags: inwards, and outwards.
@@ -124,7 +124,7 @@ impl Passage<'_> {
             .iter()
             .filter_map(|&(_, f)| {
                 let u = pierced_at(p, q, mesh.corners(f as usize))?;
-                let outwards = mesh.area_vector_doubled(f as usize).dot(q - p) > 0.0;
+                let outwards = mesh.double_area_vector(f as usize).dot(q - p) > 0.0;
                 Some((u, !outwards, outwards))
             })
             .collect();
@@ -157,7 +157,7 @@ impl Passage<'_> {
     /// No point is deeper than its distance to any one triangle. This distance is convex along the track, so
     /// its maximum is at an end.
     fn dive(&self, track: Track, best: &mut Deepest) {
-        let mesh = self.fixed.solid.mesh();
+        let mesh = self.obstacle.solid.mesh();
         let mut todo = vec![track];
         while let Some(track) = todo.pop() {
             let [p, q] = track.ends;
@@ -187,11 +187,11 @@ impl Passage<'_> {
     /// surface.
     fn probe(&self, point: Track, best: &mut Deepest) -> Option<(f64, u32)> {
         let x = point.ends[0];
-        let near = self.fixed.distance.at(x, f64::INFINITY)?;
+        let near = self.obstacle.distance.at(x, f64::INFINITY)?;
         if near.signed_mm <= best.depth_mm {
             return Some((near.signed_mm, near.face));
         }
-        if near.signed_mm > TOUCH_MM && winding_number(self.fixed.solid.mesh(), x) < 0.5 {
+        if near.signed_mm > TOUCH_MM && winding_number(self.obstacle.solid.mesh(), x) < 0.5 {
             return Some((-near.signed_mm, near.face));
         }
         *best = Deepest {
@@ -205,8 +205,8 @@ impl Passage<'_> {
 
     /// Triangles of `near` that are inside at every travel. Connected triangles without crossings are all on
     /// one side, so a test of one point decides for all of them.
-    fn swallowed(&self, near: &[u32], crossings: &[(u32, u32)]) -> Vec<u32> {
-        let mesh = self.moving.solid.mesh();
+    fn find_faces_inside(&self, near: &[u32], crossings: &[(u32, u32)]) -> Vec<u32> {
+        let mesh = self.mover.solid.mesh();
         let is_free = |f: &u32| crossings.binary_search_by_key(f, |c| c.0).is_err();
         let free: Vec<u32> = near.iter().copied().filter(is_free).collect();
         let mut leader: Vec<u32> = (0..mesh.points.len() as u32).collect();
@@ -215,14 +215,14 @@ impl Passage<'_> {
             let least = a.min(b).min(c);
             [a, b, c].into_iter().for_each(|v| leader[v as usize] = least);
         }
-        let bounds = self.fixed.bounds;
+        let bounds = self.obstacle.bounds;
         let mut is_inside: Vec<Option<bool>> = vec![None; mesh.points.len()];
         let mut answer = |v: u32| {
             *is_inside[v as usize].get_or_insert_with(|| {
                 let x = mesh.points[v as usize] + self.travels[0] * self.along;
                 bounds.contains(x)
                     && self
-                        .fixed
+                        .obstacle
                         .distance
                         .at(x, f64::INFINITY)
                         .is_some_and(|d| d.signed_mm > 0.0)
@@ -288,8 +288,8 @@ mod tests {
             "normals alone are wrong here"
         );
         let passage = Passage {
-            moving: &fixed,
-            fixed: &fixed,
+            mover: &fixed,
+            obstacle: &fixed,
             along: Vec3::X,
             travels: [0.0, 1.0],
         };
@@ -310,8 +310,8 @@ mod tests {
         let solid = cuboid([0.0; 3], [6.0, 2.0, 3.0]).union(&cuboid([0.0; 3], [2.0, 5.0, 3.0]));
         let fixed = Shape::new(&Solid::new(solid.to_mesh()).unwrap());
         let passage = Passage {
-            moving: &fixed,
-            fixed: &fixed,
+            mover: &fixed,
+            obstacle: &fixed,
             along: Vec3::X,
             travels: [0.0, 1.0],
         };

@@ -190,11 +190,11 @@ pub(super) fn edges([a, b, c]: [Vec3; 3]) -> [(Vec3, Vec3); 3] {
 
 /// Bounding box of a triangle moved by all travels.
 pub(super) fn swept_box(t: [Vec3; 3], [from, far]: [f64; 2]) -> Aabb {
-    raised(Aabb::around(t), [from, far])
+    sweep_box(Aabb::around(t), [from, far])
 }
 
 /// Bounding box of a box moved along z by all travels.
-pub(super) fn raised(b: Aabb, [from, far]: [f64; 2]) -> Aabb {
+pub(super) fn sweep_box(b: Aabb, [from, far]: [f64; 2]) -> Aabb {
     Aabb {
         min: b.min + from * Vec3::Z,
         max: b.max + far * Vec3::Z,

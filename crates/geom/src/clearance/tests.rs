@@ -26,7 +26,7 @@ fn lump(rng: &mut ChaCha8Rng, shift: Vec3) -> Volume {
     Volume::union_all(vec![part(), part(), part()])
 }
 
-fn moved(t: [Vec3; 3], by: Vec3) -> [Vec3; 3] {
+fn shift(t: [Vec3; 3], by: Vec3) -> [Vec3; 3] {
     t.map(|p| p + by)
 }
 
@@ -35,7 +35,7 @@ fn by_brute_force(a: &TriMesh, b: &TriMesh, by: Vec3) -> f64 {
     let faces = |m: &TriMesh| 0..m.triangles.len();
     faces(a)
         .flat_map(|i| faces(b).map(move |j| (i, j)))
-        .filter_map(|(i, j)| at_rest(moved(a.corners(i), by), b.corners(j), f64::INFINITY))
+        .filter_map(|(i, j)| at_rest(shift(a.corners(i), by), b.corners(j), f64::INFINITY))
         .map(|found| found.distance_sq.sqrt())
         .fold(f64::INFINITY, f64::min)
 }
@@ -378,11 +378,19 @@ fn only_what_counts_is_taken_into_account() {
     );
     let faces_up = |v: &Volume| {
         let solid = solid(v);
-        Shape::new(&solid).counting(|f| solid.mesh().face_normal(f).y > 0.5)
+        Shape::new(&solid).count_only(|f| solid.mesh().face_normal(f).y > 0.5)
     };
     let found = least_gap(&faces_up(&a), &faces_up(&b), Scope::WhatCounts, 5.0).unwrap();
     assert!((found.gap_mm - 0.01f64.hypot(2.0)).abs() < 1e-12, "{found:?}");
-    assert!(least_gap(&shape(&a).counting(|_| false), &shape(&b), Scope::WhatCounts, 5.0).is_none());
+    assert!(
+        least_gap(
+            &shape(&a).count_only(|_| false),
+            &shape(&b),
+            Scope::WhatCounts,
+            5.0
+        )
+        .is_none()
+    );
 }
 
 #[test]
@@ -457,7 +465,7 @@ fn where_triangles_in_one_plane_come_nearest_both_of_them_are() {
         let (a, mut b) = ([0; 3].map(|_| corner()), [0; 3].map(|_| corner()));
         // The second triangle is beside, behind or in the path, near or far.
         let off_mm = size * 10f64.powi(case % 5 - 1);
-        b = moved(
+        b = shift(
             b,
             off_mm * (f64::from(case % 4) - 1.0) * along + off_mm * f64::from(case % 3) * x,
         );
@@ -467,7 +475,7 @@ fn where_triangles_in_one_plane_come_nearest_both_of_them_are() {
         let Some(found) = pair::swept(a, b, [0.0, 50.0], f64::INFINITY) else {
             panic!("there is no limit");
         };
-        let there = moved(a, found.travel_mm * Vec3::Z);
+        let there = shift(a, found.travel_mm * Vec3::Z);
         let off = |t: [Vec3; 3], p: Vec3| nearest_on_triangle(t, p).0.distance(p);
         assert!(
             off(there, found.on_a) < 1e-6 && off(b, found.on_b) < 1e-6,

@@ -1,6 +1,6 @@
 //! Pairs of nearby triangles, found by descending two hierarchies at once.
 
-use super::pair::{box_distance_sq, raised, swept_box};
+use super::pair::{box_distance_sq, sweep_box, swept_box};
 use crate::bvh::TriangleBvh;
 
 /// Calls `near(i, j, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq` of each
@@ -15,7 +15,7 @@ pub(super) fn for_near_pairs(
 ) {
     let apart = |i: u32, j: u32| {
         box_distance_sq(
-            raised(a.nodes[i as usize].bounds, travels),
+            sweep_box(a.nodes[i as usize].bounds, travels),
             b.nodes[j as usize].bounds,
         )
     };

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// A graph of nodes and undirected edges with capacities. [Dinic1970]
 pub(super) struct Network {
     /// Arcs that leave each node.
-    leaving: Vec<Vec<u32>>,
+    out_arcs: Vec<Vec<u32>>,
     /// Head and residual capacity of each arc; arc `a ^ 1` is its reverse.
     arcs: Vec<(u32, u64)>,
 }
@@ -13,7 +13,7 @@ pub(super) struct Network {
 impl Network {
     pub(super) fn new(n_nodes: usize) -> Self {
         Self {
-            leaving: vec![Vec::new(); n_nodes],
+            out_arcs: vec![Vec::new(); n_nodes],
             arcs: Vec::new(),
         }
     }
@@ -21,8 +21,8 @@ impl Network {
     pub(super) fn join(&mut self, a: u32, b: u32, capacity: u64) {
         let arc = self.arcs.len() as u32;
         self.arcs.extend([(b, capacity), (a, capacity)]);
-        self.leaving[a as usize].push(arc);
-        self.leaving[b as usize].push(arc + 1);
+        self.out_arcs[a as usize].push(arc);
+        self.out_arcs[b as usize].push(arc + 1);
     }
 
     /// Marks the nodes on the source's side of the minimum cut. Of several minimum cuts, takes the one
@@ -33,18 +33,18 @@ impl Network {
             if steps[sink as usize].is_none() {
                 return steps.iter().map(Option::is_some).collect();
             }
-            let mut tried = vec![0; self.leaving.len()];
+            let mut tried = vec![0; self.out_arcs.len()];
             while self.push(source, sink, &steps, &mut tried) {}
         }
     }
 
     /// Distance of each node from the source, in arcs with residual capacity.
     fn steps_from(&self, source: u32) -> Vec<Option<u32>> {
-        let mut steps = vec![None; self.leaving.len()];
+        let mut steps = vec![None; self.out_arcs.len()];
         steps[source as usize] = Some(0);
         let mut todo = VecDeque::from([source]);
         while let Some(node) = todo.pop_front() {
-            for &arc in &self.leaving[node as usize] {
+            for &arc in &self.out_arcs[node as usize] {
                 let (to, room) = self.arcs[arc as usize];
                 if room > 0 && steps[to as usize].is_none() {
                     steps[to as usize] = steps[node as usize].map(|n| n + 1);
@@ -61,7 +61,7 @@ impl Network {
         let mut node = source;
         while node != sink {
             let at = node as usize;
-            match self.leaving[at].get(tried[at]) {
+            match self.out_arcs[at].get(tried[at]) {
                 Some(&arc) => {
                     let (to, room) = self.arcs[arc as usize];
                     if room > 0 && steps[to as usize] == steps[at].map(|n| n + 1) {

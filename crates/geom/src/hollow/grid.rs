@@ -19,7 +19,7 @@ pub(super) struct Grid {
     n: [usize; 3],
     /// Bit `axis` of a node is set if the surface crosses the edge to the next node along that axis, or that
     /// node is missing.
-    crossed: Vec<u8>,
+    crossings: Vec<u8>,
     /// True for nodes inside the solid.
     is_solid: Vec<bool>,
 }
@@ -39,7 +39,7 @@ impl Grid {
             origin: bounds.min + cell_mm * (SHIFT - MARGIN),
             cell_mm,
             n,
-            crossed: vec![0; n_nodes],
+            crossings: vec![0; n_nodes],
             is_solid: vec![false; n_nodes],
         };
         let mut entered = vec![0_i32; n_nodes];
@@ -52,7 +52,7 @@ impl Grid {
         for node in 0..n_nodes {
             let place = grid.place(node);
             for axis in (0..3).filter(|&axis| place[axis] + 1 == n[axis]) {
-                grid.crossed[node] |= 1 << axis;
+                grid.crossings[node] |= 1 << axis;
             }
         }
         grid
@@ -99,9 +99,9 @@ impl Grid {
     }
 
     /// Neighbours of `node` along grid edges that do not cross the surface.
-    pub(super) fn joined(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn linked_nodes(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
         let strides = self.strides();
-        let is_open = move |at: usize, axis: usize| self.crossed[at] >> axis & 1 == 0;
+        let is_open = move |at: usize, axis: usize| self.crossings[at] >> axis & 1 == 0;
         // The node before the first of a row is the last of another row, whose edge is marked as crossed.
         (0..3).flat_map(move |axis| {
             let on = is_open(node, axis).then(|| node + strides[axis]);
@@ -129,7 +129,7 @@ impl Grid {
             let stride = self.strides()[axis];
             let starts = (0..self.len()).filter(|&node| self.place(node)[axis] == 0);
             for start in starts {
-                let is_crossed = |at: &usize| self.crossed[start + at * stride] & (1 << axis) != 0;
+                let is_crossed = |at: &usize| self.crossings[start + at * stride] & (1 << axis) != 0;
                 let mut edges = 0..self.n[axis] - 1;
                 let (first, last) = (edges.clone().find(is_crossed), edges.rfind(is_crossed));
                 if let (Some(first), Some(last)) = (first, last) {
@@ -167,7 +167,7 @@ impl Grid {
                 }
                 let below = (height.floor().max(0.0) as usize).min(self.n[axis] - 2);
                 let node = i * strides[right] + j * strides[up] + below * strides[axis];
-                self.crossed[node] |= 1 << axis;
+                self.crossings[node] |= 1 << axis;
                 if axis == 2 {
                     entered[node + strides[2]] += if turns[0].1 { -1 } else { 1 };
                 }

@@ -93,7 +93,7 @@ fn seeds(grid: &Grid, clearance: &[f32], radius_mm: f32) -> Vec<Option<Room>> {
         is_seen[start] = true;
         while let Some(&node) = part.get(next) {
             next += 1;
-            for other in grid.joined(node) {
+            for other in grid.linked_nodes(node) {
                 if has_room(other) && !std::mem::replace(&mut is_seen[other], true) {
                     part.push(other);
                 }
@@ -120,7 +120,7 @@ fn seeds(grid: &Grid, clearance: &[f32], radius_mm: f32) -> Vec<Option<Room>> {
 
 /// Gives each reachable free node the region to which its widest path leads.
 fn grow(grid: &Grid, clearance: &[f32], room: &mut [Option<Room>]) {
-    let has_way_on = |node: usize| grid.joined(node).any(|other| room[other].is_none());
+    let has_way_on = |node: usize| grid.linked_nodes(node).any(|other| room[other].is_none());
     // Pairs of the narrowest clearance on the path to a node, and the node.
     let mut todo: BinaryHeap<(u32, Reverse<usize>)> = (0..grid.len())
         .filter(|&node| room[node].is_some() && has_way_on(node))
@@ -133,7 +133,7 @@ fn grow(grid: &Grid, clearance: &[f32], room: &mut [Option<Room>]) {
         .or_else(|| todo.pop().map(|(narrowest, Reverse(node))| (narrowest, node)))
     {
         for other in grid
-            .joined(node)
+            .linked_nodes(node)
             .filter(|&other| room[other].is_none())
             .collect::<Vec<_>>()
         {

@@ -40,7 +40,7 @@ pub(super) struct Sides<'a> {
 }
 
 /// A closed line between triangles of the cavity and others, as half-edges of the others.
-pub(super) struct Rim {
+pub(super) struct CavityRim {
     pub(super) edges: Vec<HalfEdge>,
     pub(super) center: Vec3,
     /// Distance of the farthest point of the line from the centre, mm.
@@ -58,7 +58,7 @@ impl<'a> Sides<'a> {
     ) -> Self {
         let mut seen: Vec<Option<Room>> = (0..mesh.triangles.len())
             .into_par_iter()
-            .map(|face| room_seen(mesh, face, tree, grid, rooms))
+            .map(|face| find_room(mesh, face, tree, grid, rooms))
             .collect();
         let mut todo: VecDeque<u32> = (0..seen.len() as u32)
             .filter(|&face| seen[face as usize].is_some())
@@ -102,7 +102,7 @@ impl<'a> Sides<'a> {
     }
 
     /// Lines between both sides; lines that share a point count as one.
-    pub(super) fn rims(&self) -> Vec<Rim> {
+    pub(super) fn rims(&self) -> Vec<CavityRim> {
         let is_cavity = |h: HalfEdge| self.is_cavity[h as usize / 3];
         let edges: Vec<HalfEdge> = (0..self.topology.n_half_edges() as u32)
             .filter(|&h| !is_cavity(h) && is_cavity(self.topology.opposite(h)))
@@ -123,7 +123,7 @@ impl<'a> Sides<'a> {
             .collect()
     }
 
-    fn rim(&self, edges: Vec<HalfEdge>) -> Rim {
+    fn rim(&self, edges: Vec<HalfEdge>) -> CavityRim {
         let (mut moment, mut length) = (Vec3::ZERO, 0.0);
         for [a, b] in edges.iter().map(|&h| self.ends(h)) {
             moment += 0.5 * a.distance(b) * (a + b);
@@ -131,7 +131,7 @@ impl<'a> Sides<'a> {
         }
         let center = moment / length.max(f64::MIN_POSITIVE);
         let away = edges.iter().map(|&h| self.ends(h)[0].distance(center));
-        Rim {
+        CavityRim {
             radius_mm: away.fold(0.0, f64::max),
             center,
             edges,
@@ -181,7 +181,7 @@ impl<'a> Sides<'a> {
     /// Marks the triangles that may lie in an opening: those within a ball around a rim's centre. The ball
     /// contains a channel as wide as the rim and as deep as openings are.
     fn near_rims(&self, wall_mm: f64, cell_mm: f64) -> Vec<bool> {
-        let reach_mm = |rim: &Rim| rim.radius_mm.hypot(DEEPEST_WALLS * wall_mm) + 2.0 * cell_mm;
+        let reach_mm = |rim: &CavityRim| rim.radius_mm.hypot(DEEPEST_WALLS * wall_mm) + 2.0 * cell_mm;
         let near: Vec<(Vec3, f64)> = self
             .rims()
             .iter()
@@ -241,7 +241,7 @@ impl<'a> Sides<'a> {
 }
 
 /// Region of a node that triangle `face` sees from its outer side.
-fn room_seen(
+fn find_room(
     mesh: &TriMesh,
     face: usize,
     tree: &TriangleBvh,

@@ -24,7 +24,7 @@ fn solid(volume: &Volume) -> Solid {
     Solid::new(volume.to_mesh()).unwrap()
 }
 
-fn found(volume: &Volume) -> Option<HollowBody> {
+fn find(volume: &Volume) -> Option<HollowBody> {
     find_hollow(&solid(volume), LEAST_SHARE)
 }
 
@@ -147,6 +147,6 @@ fn solid_bodies_vessels_and_cages_are_not_hollow() {
     }
     let ring = Volume::from_closed_mesh(&torus(30.0, 12.0, [60, 30])).unwrap();
     for body in [ball, mug, bowl, vase, pipe, cage, ring] {
-        assert_eq!(found(&body), None);
+        assert_eq!(find(&body), None);
     }
 }

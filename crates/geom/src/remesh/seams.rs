@@ -22,7 +22,7 @@ impl Seam {
 
     /// Point at a place. Clamps to the ends of an open line; continues around a closed one.
     pub fn point(&self, at_mm: f64) -> Vec3 {
-        let at = self.wrapped(at_mm);
+        let at = self.wrap(at_mm);
         let i = self
             .at_mm
             .partition_point(|&a| a <= at)
@@ -37,7 +37,7 @@ impl Seam {
     }
 
     /// Equivalent place in `0 .. length` on a closed line; unchanged on an open one.
-    pub fn wrapped(&self, at_mm: f64) -> f64 {
+    pub fn wrap(&self, at_mm: f64) -> f64 {
         if self.is_closed && self.length_mm() > 0.0 {
             at_mm.rem_euclid(self.length_mm())
         } else {
@@ -150,7 +150,7 @@ impl Surface {
         let name = self.seam[onwards as usize];
         Some((
             name,
-            seams[name as usize].wrapped(at + 0.5 * share * ((after - at) - (here - before))),
+            seams[name as usize].wrap(at + 0.5 * share * ((after - at) - (here - before))),
         ))
     }
 

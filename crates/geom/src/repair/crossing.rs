@@ -75,9 +75,9 @@ pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
 
 /// Makes one surface around the volume that a closed surface encloses at least once. Returns a copy if the
 /// surface neither crosses nor touches itself, and `None` if the union is too much work or fails.
-pub(super) fn united(mesh: &TriMesh) -> Option<TriMesh> {
+pub(super) fn unite(mesh: &TriMesh) -> Option<TriMesh> {
     let n = crossings(mesh).count;
-    if n == 0 && inspect_edges(mesh).shared.count == 0 && matches!(touching(mesh), Ok(None)) {
+    if n == 0 && inspect_edges(mesh).non_manifold.count == 0 && matches!(find_touch(mesh), Ok(None)) {
         return Some(mesh.clone());
     }
     (n <= MAX_RESOLVED).then(|| boolean::rebuild(mesh).ok()).flatten()
@@ -87,9 +87,9 @@ pub(super) fn united(mesh: &TriMesh) -> Option<TriMesh> {
 /// itself, has edges of more than two triangles, or has several bodies whose faces touch.
 pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let found = crossings(&draft.mesh);
-    let shared = inspect_edges(&draft.mesh).shared;
+    let shared = inspect_edges(&draft.mesh).non_manifold;
     let (kind, count, at) = match (found.count, shared.count) {
-        (0, 0) => match touching(&draft.mesh)? {
+        (0, 0) => match find_touch(&draft.mesh)? {
             Some((n_bodies, at)) => (RepairKind::Fused, n_bodies, at),
             None => return Ok(None),
         },
@@ -131,7 +131,7 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
 
 /// Number of bodies and the centre of the second, if faces of several bodies touch. [`crossings`] does not
 /// detect that.
-fn touching(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
+fn find_touch(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
     /// Largest number of bodies that are compared pairwise.
     const MAX_BODIES: usize = 1000;
     let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::closed;
+use super::close_surface;
 use crate::boolean::Volume;
 use crate::bvh::TriangleBvh;
 use crate::check::InputError;
@@ -10,7 +10,7 @@ use crate::{TriMesh, Vec3};
 
 /// Result of subtracting cutters from a body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cut {
+pub struct Carving {
     /// Closed surface of the remaining body, which may be in several parts.
     pub mesh: TriMesh,
     /// Source triangle of each triangle.
@@ -65,7 +65,7 @@ pub enum CutError {
 /// and may have several bodies.
 ///
 /// Fails if a mesh bounds no volume, and if the cut leaves nothing.
-pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
+pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Carving, CutError> {
     let (volume, _) = volume(body).map_err(CutError::Body)?;
     let mut left = volume.clone();
     let (mut is_met, mut was_open) = (Vec::new(), Vec::new());
@@ -80,7 +80,7 @@ pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
     }
     let mesh = left.to_mesh();
     let faces = origins(&mesh, body, cutters);
-    Ok(Cut {
+    Ok(Carving {
         mesh,
         faces,
         is_met,
@@ -90,7 +90,7 @@ pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
 
 /// Returns the volume inside a surface, and true if holes had to be closed for it.
 fn volume(mesh: &TriMesh) -> Result<(Volume, bool), InputError> {
-    let ((closed, had_holes), at) = (closed(mesh)?, mesh.face_center(0));
+    let ((closed, had_holes), at) = (close_surface(mesh)?, mesh.face_center(0));
     let volume = Volume::from_closed_mesh(&closed).map_err(|_| InputError::Crossing { count: 1, at })?;
     Ok((volume, had_holes))
 }

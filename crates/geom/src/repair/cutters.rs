@@ -1,6 +1,6 @@
 //! Bodies that are inside out and overlap another body: either meant as a hole, or flipped by mistake.
 
-use super::crossing::{crossing_pairs, united};
+use super::crossing::{crossing_pairs, unite};
 use super::shells::{self, Shells};
 use super::{Draft, Repair, RepairKind};
 use crate::check::InputError;
@@ -94,7 +94,7 @@ fn overlap(mesh: &TriMesh, shells: &Shells, (inverted, upright): (usize, usize),
     if !crosses && boolean::touches_itself(&both) != Ok(true) {
         return false;
     }
-    let turned = turned(shells.part(mesh, |shell| shell == inverted));
+    let turned = invert(shells.part(mesh, |shell| shell == inverted));
     let upright_mesh = shells.part(mesh, |shell| shell == upright);
     let volumes = [turned, upright_mesh].map(|part| Volume::from_closed_mesh(&part));
     let [Ok(a), Ok(b)] = volumes else { return crosses };
@@ -107,10 +107,10 @@ fn cut_out(draft: &mut Draft, is_cut: &[bool]) -> Option<f64> {
     let [mut cut, mut rest] = [draft.clone(), draft.clone()];
     cut.retain(is_cut);
     rest.retain(&is_cut.iter().map(|cut| !cut).collect::<Vec<_>>());
-    cut.mesh = turned(cut.mesh);
+    cut.mesh = invert(cut.mesh);
     let _ = shells::turn_outwards(&mut rest);
     let [whole, tool] = [rest, cut].map(|part| {
-        let one = united(&part.mesh)?;
+        let one = unite(&part.mesh)?;
         Volume::from_closed_mesh(&one).ok()
     });
     let (whole, tool) = (whole?, tool?);
@@ -122,7 +122,7 @@ fn cut_out(draft: &mut Draft, is_cut: &[bool]) -> Option<f64> {
     Some(whole.volume() - left.volume())
 }
 
-fn turned(mut mesh: TriMesh) -> TriMesh {
+fn invert(mut mesh: TriMesh) -> TriMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     mesh
 }

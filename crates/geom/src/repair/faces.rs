@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::{Draft, Repair, RepairKind};
 use crate::Vec3;
-use crate::check::{Side, sides};
+use crate::check::{TriangleSide, sides};
 
 /// Removes duplicates of triangles with the same corners. Triangles that face opposite ways cancel in pairs.
 pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
@@ -12,7 +12,7 @@ pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
     let mut order: Vec<([u32; 3], u32)> = triangles
         .iter()
         .zip(0..)
-        .map(|(t, face)| (sorted(*t), face))
+        .map(|(t, face)| (sort(*t), face))
         .collect();
     order.sort_unstable();
     let mut is_kept = vec![true; triangles.len()];
@@ -44,7 +44,7 @@ pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
-fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
+fn sort(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle.sort_unstable();
     triangle
 }
@@ -57,7 +57,7 @@ pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
     // Neighbours of each triangle, each with a flag if it faces the other way.
     let mut across: Vec<Vec<(u32, bool)>> = vec![Vec::new(); mesh.triangles.len()];
     let mut has_turned = false;
-    for edge in sides.chunk_by(Side::same_edge) {
+    for edge in sides.chunk_by(TriangleSide::same_edge) {
         if let [one, other] = edge {
             let is_turned = one.runs_up(mesh) == other.runs_up(mesh);
             has_turned |= is_turned;

@@ -1,7 +1,7 @@
 //! Small holes, closed by the triangles of least area between their edges.
 
 use super::{Draft, HOLE_SHARE, Repair, RepairKind};
-use crate::check::{Side, sides};
+use crate::check::{TriangleSide, sides};
 use crate::{Aabb, TriMesh, Vec3};
 
 /// Largest number of edges of a hole that is closed. Larger ones that are as narrow are cracks of another
@@ -95,7 +95,7 @@ struct Rim {
 /// All open edges of a mesh, with their surroundings.
 struct Rims<'a> {
     mesh: &'a TriMesh,
-    sides: Vec<Side>,
+    sides: Vec<TriangleSide>,
     /// Corner at which the neighbour's side along the same edge begins, for each corner; `None` if the edge
     /// is open.
     opposite: Vec<Option<u32>>,
@@ -105,7 +105,7 @@ impl<'a> Rims<'a> {
     fn of(mesh: &'a TriMesh) -> Self {
         let sides = sides(mesh);
         let mut opposite = vec![None; 3 * mesh.triangles.len()];
-        for edge in sides.chunk_by(Side::same_edge) {
+        for edge in sides.chunk_by(TriangleSide::same_edge) {
             if let [one, other] = edge
                 && one.runs_up(mesh) != other.runs_up(mesh)
             {
@@ -129,11 +129,11 @@ impl<'a> Rims<'a> {
     /// Walks around each hole. Open edges next to edges of three and more triangles may lead nowhere; these
     /// give no hole.
     fn loops(&self) -> Vec<Rim> {
-        let is_single = |edge: &[Side]| edge.len() == 1;
+        let is_single = |edge: &[TriangleSide]| edge.len() == 1;
         let mut is_open = vec![false; self.opposite.len()];
         let open: Vec<u32> = self
             .sides
-            .chunk_by(Side::same_edge)
+            .chunk_by(TriangleSide::same_edge)
             .filter(|e| is_single(e))
             .map(|e| e[0].corner)
             .collect();

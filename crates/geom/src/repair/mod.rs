@@ -26,7 +26,7 @@ mod walls;
 
 pub(crate) use crossing::crossing_faces;
 pub use crossing::{Crossings, crossings};
-pub use cut::{Cut, CutError, CutFace, cut_out};
+pub use cut::{Carving, CutError, CutFace, cut_out};
 pub use cutters::InsideOut;
 pub(crate) use holes::cap_all;
 pub use report::{Repair, RepairKind};
@@ -160,7 +160,7 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
 
 /// A closed surface of any number of bodies, made of a mesh as read and repaired as by [`repair`]; and
 /// whether it had holes, which were closed.
-pub(crate) fn closed(mesh: &TriMesh) -> Result<(TriMesh, bool), InputError> {
+pub(crate) fn close_surface(mesh: &TriMesh) -> Result<(TriMesh, bool), InputError> {
     check_points(mesh)?;
     let (mut draft, repairs, _) = close_up(mesh)?;
     let had_holes = repairs
@@ -178,7 +178,7 @@ pub(crate) fn closed(mesh: &TriMesh) -> Result<(TriMesh, bool), InputError> {
 /// volume.
 fn check_edges(draft: &Draft) -> Result<(), InputError> {
     let found = inspect(&draft.mesh);
-    let turned = found.edges.turned;
+    let turned = found.edges.flips;
     if turned.count > 0 {
         return Err(InputError::OneSided {
             count: turned.count,

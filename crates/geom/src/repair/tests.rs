@@ -1,15 +1,15 @@
 use super::*;
-use crate::samples::{ball, both, cube, cuboid, flipped, unwelded};
+use crate::samples::{ball, both, cube, cuboid, flip, unweld};
 use crate::{Vec3, Volume};
 
-fn mended(mesh: &TriMesh) -> Repaired {
+fn mend(mesh: &TriMesh) -> Repaired {
     repair(mesh, RepairMode::Repair).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Repairs, and asserts the kinds and counts of changes and the volume. Also asserts that nothing is done
 /// without permission.
-fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repaired {
-    let repaired = mended(mesh);
+fn assert_repair(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repaired {
+    let repaired = mend(mesh);
     let done: Vec<(&str, usize)> = repaired
         .repairs
         .iter()
@@ -30,7 +30,7 @@ fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repair
     );
     assert!(repair(mesh, RepairMode::Refuse).is_err());
     // A repaired mesh needs no further repair.
-    let again = mended(repaired.solid.mesh());
+    let again = mend(repaired.solid.mesh());
     assert_eq!(
         (again.repairs.len(), again.solid.mesh()),
         (0, repaired.solid.mesh())
@@ -44,7 +44,7 @@ fn base() -> TriMesh {
 
 #[test]
 fn a_sound_mesh_comes_out_bit_by_bit_with_leave_or_without() {
-    for mesh in [base(), unwelded(&base())] {
+    for mesh in [base(), unweld(&base())] {
         let (solid, kept) = into_solid(&mesh).unwrap();
         for mending in [RepairMode::Refuse, RepairMode::Repair, RepairMode::KeepLargest] {
             let repaired = repair(&mesh, mending).unwrap();
@@ -56,7 +56,7 @@ fn a_sound_mesh_comes_out_bit_by_bit_with_leave_or_without() {
 
 #[test]
 fn cracks_are_closed_and_gaps_are_not() {
-    let mut cracked = unwelded(&base());
+    let mut cracked = unweld(&base());
     let move_by = |i: usize, by: f64| {
         by * Vec3::new(
             ((7 * i) % 11) as f64 - 5.0,
@@ -69,7 +69,7 @@ fn cracks_are_closed_and_gaps_are_not() {
         .iter_mut()
         .enumerate()
         .for_each(|(i, p)| *p += move_by(i, 1e-6));
-    let repaired = mended(&cracked);
+    let repaired = mend(&cracked);
     assert_eq!(repaired.repairs[0].kind.code(), "points-merged");
     assert!((repaired.solid.volume() / base().signed_volume() - 1.0).abs() < 1e-5);
     assert_eq!(repaired.solid.mesh().points.len(), base().points.len());
@@ -88,7 +88,7 @@ fn cracks_are_closed_and_gaps_are_not() {
 fn copies_are_removed_and_those_back_to_back_cancel() {
     let mut doubled = base();
     doubled.triangles.extend_from_within(..50);
-    let repaired = assert_mended(&doubled, &[("copies-removed", 50)], base().signed_volume());
+    let repaired = assert_repair(&doubled, &[("copies-removed", 50)], base().signed_volume());
     assert_eq!(repaired.solid.mesh(), &base());
     // A flap attached to an edge: two triangles back to back.
     let mut flap = base();
@@ -96,7 +96,7 @@ fn copies_are_removed_and_those_back_to_back_cancel() {
     flap.points.push(Vec3::splat(20.0));
     let tip = flap.points.len() as u32 - 1;
     flap.triangles.extend([[a, b, tip], [b, a, tip]]);
-    assert_mended(&flap, &[("copies-removed", 2)], base().signed_volume());
+    assert_repair(&flap, &[("copies-removed", 2)], base().signed_volume());
 }
 
 #[test]
@@ -104,11 +104,11 @@ fn turned_triangles_are_turned_back_and_bodies_inside_out_too() {
     let mut some = base();
     some.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1));
     let n = some.triangles.len().div_ceil(3);
-    assert_mended(&some, &[("triangles-turned", n)], base().signed_volume());
-    assert_mended(&flipped(base()), &[("body-turned", 1)], base().signed_volume());
-    let mut most = flipped(base());
+    assert_repair(&some, &[("triangles-turned", n)], base().signed_volume());
+    assert_repair(&flip(base()), &[("body-turned", 1)], base().signed_volume());
+    let mut most = flip(base());
     most.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1));
-    assert_mended(
+    assert_repair(
         &most,
         &[("triangles-turned", n), ("body-turned", 1)],
         base().signed_volume(),
@@ -129,14 +129,14 @@ fn corners_on_edges_are_joined() {
         divided.triangles.push([m, b, c]);
     }
     let n = base().triangles.len().div_ceil(20);
-    assert_mended(&divided, &[("edges-joined", n)], base().signed_volume());
+    assert_repair(&divided, &[("edges-joined", n)], base().signed_volume());
 }
 
 #[test]
 fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_their_place() {
     let mut three = base();
     three.triangles.swap_remove(17);
-    let repaired = assert_mended(&three, &[("holes-closed", 1)], base().signed_volume());
+    let repaired = assert_repair(&three, &[("holes-closed", 1)], base().signed_volume());
     assert!(repaired.repairs[0].at.distance(Vec3::new(3.0, -2.0, 1.0)) > 9.0);
     // All triangles around a point are removed, which leaves a hole of five or six edges.
     let around = |mesh: &TriMesh, n: usize| {
@@ -145,7 +145,7 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
         holed
     };
     let fine = ball(Vec3::ZERO, 10.0, 7);
-    let repaired = mended(&around(&fine, 0));
+    let repaired = mend(&around(&fine, 0));
     assert_eq!(repaired.repairs[0].kind.code(), "holes-closed");
     assert!((repaired.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);
     let refused = repair(&around(&base(), 100), RepairMode::Repair).unwrap_err();
@@ -170,13 +170,13 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
         Err(InputError::Bodies(b)) if b.len() == 2
     ));
     let edge = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
-    let refused = repair(&unwelded(&edge), RepairMode::Repair).unwrap_err();
+    let refused = repair(&unweld(&edge), RepairMode::Repair).unwrap_err();
     assert!(
         matches!(&refused, InputError::Bodies(b) if b.len() == 2),
         "{refused}"
     );
     assert!(
-        (repair(&unwelded(&edge), RepairMode::KeepLargest)
+        (repair(&unweld(&edge), RepairMode::KeepLargest)
             .unwrap()
             .solid
             .volume()
@@ -188,7 +188,7 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
     let mut pinched = base();
     let (near, far) = (pinched.triangles[0][0], pinched.triangles[300][0]);
     pinched.points[far as usize] = pinched.points[near as usize];
-    let repaired = mended(&unwelded(&pinched));
+    let repaired = mend(&unweld(&pinched));
     assert!(
         repaired
             .repairs
@@ -202,16 +202,16 @@ fn specks_inner_bodies_and_cavities_are_left_out() {
     let volume = base().signed_volume();
     let speck = |i: u32| ball(Vec3::new(15.0, f64::from(i), 0.0), 0.02, 0);
     let specks = (0..20).fold(base(), |mesh, i| both(mesh, speck(i)));
-    assert_mended(&specks, &[("specks-removed", 20)], volume);
+    assert_repair(&specks, &[("specks-removed", 20)], volume);
     let inner = ball(Vec3::new(4.0, -2.0, 1.0), 3.0, 2);
-    assert_mended(
-        &both(base(), flipped(inner.clone())),
+    assert_repair(
+        &both(base(), flip(inner.clone())),
         &[("cavities-filled", 1)],
         volume,
     );
-    assert_mended(&both(base(), inner.clone()), &[("cavities-filled", 1)], volume);
-    assert_mended(
-        &both(flipped(base()), inner),
+    assert_repair(&both(base(), inner.clone()), &[("cavities-filled", 1)], volume);
+    assert_repair(
+        &both(flip(base()), inner),
         &[("body-turned", 2), ("cavities-filled", 1)],
         volume,
     );
@@ -222,7 +222,7 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
     let other = ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3);
     let union = [base(), other.clone()].map(|m| Volume::from_closed_mesh(&m).unwrap());
     let union = union[0].union(&union[1]).volume();
-    let repaired = mended(&both(base(), other));
+    let repaired = mend(&both(base(), other));
     assert!((repaired.solid.volume() - union).abs() < 1e-6 * union);
     assert!(matches!(
         repaired.repairs[..],
@@ -255,7 +255,7 @@ fn bodies_that_touch_with_faces_are_united() {
     // First they share half of a side, then a part of the volume, with sides in common planes.
     for (at, volume) in [(Vec3::new(1.0, 0.5, 0.0), 2.0), (Vec3::new(0.5, 0.0, 0.0), 1.5)] {
         let pair = both(cube(Vec3::ZERO, 1.0), cube(at, 1.0));
-        assert_mended(&pair, &[("bodies-united", 2)], volume);
+        assert_repair(&pair, &[("bodies-united", 2)], volume);
     }
 }
 
@@ -347,7 +347,7 @@ fn coordinates_rounded_too_coarsely_are_told_as_such() {
 fn repairs_say_what_how_many_and_where() {
     let mut three = base();
     three.triangles.swap_remove(17);
-    let text = mended(&three).repairs[0].to_string();
+    let text = mend(&three).repairs[0].to_string();
     assert!(
         text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("),
         "{text}"
@@ -419,15 +419,15 @@ fn walls_between_glued_boxes_are_removed() {
         box_without(Vec3::new(x, y, 0.0), Vec3::new(x + 2.0, y + 3.0, 4.0), missing)
     };
     let two = both(room(0.0, 0.0, &[]), room(2.0, 0.0, &[0]));
-    assert_mended(&unwelded(&two), &[("inner-walls-removed", 2)], 48.0);
+    assert_repair(&unweld(&two), &[("inner-walls-removed", 2)], 48.0);
     let four = [room(0.0, 3.0, &[2]), room(2.0, 3.0, &[0, 2])]
         .into_iter()
         .fold(two.clone(), both);
-    let repaired = assert_mended(&unwelded(&four), &[("inner-walls-removed", 8)], 96.0);
+    let repaired = assert_repair(&unweld(&four), &[("inner-walls-removed", 8)], 96.0);
     assert!(repaired.repairs[0].at.z.fract() != 0.0);
     // The result does not depend on the way the walls face.
-    let turned = both(room(0.0, 0.0, &[1]), flipped(room(2.0, 0.0, &[])));
-    let repaired = mended(&unwelded(&turned));
+    let turned = both(room(0.0, 0.0, &[1]), flip(room(2.0, 0.0, &[])));
+    let repaired = mend(&unweld(&turned));
     assert!((repaired.solid.volume() - 48.0).abs() < 1e-12);
 }
 
@@ -450,7 +450,7 @@ fn ball_with_disc() -> (TriMesh, Vec<u32>) {
 fn a_wall_across_a_body_is_removed_and_one_that_comes_out_is_refused() {
     let whole = ball(Vec3::ZERO, 10.0, 3);
     let (divided, equator) = ball_with_disc();
-    assert_mended(
+    assert_repair(
         &divided,
         &[("inner-walls-removed", equator.len() - 2)],
         whole.signed_volume(),
@@ -464,7 +464,7 @@ fn a_wall_across_a_body_is_removed_and_one_that_comes_out_is_refused() {
     };
     let cube = cube(Vec3::splat(-5.0), 10.0);
     for half in [5.0, 4.0, 5.0 + 1e-6] {
-        assert_mended(
+        assert_repair(
             &both(cube.clone(), sheet(half)),
             &[("inner-walls-removed", 2)],
             1000.0,
@@ -500,7 +500,7 @@ fn a_body_inside_out_that_overlaps_another_is_asked_about_and_cut_or_united() {
     let flush = cuboid([-2.0, -2.0, 4.0], [2.0, 2.0, 10.0]).to_mesh();
     let block = cuboid([-10.0; 3], [10.0; 3]).to_mesh();
     for (body, tool) in [(base(), other), (block, flush)] {
-        let cutter = both(body.clone(), flipped(tool.clone()));
+        let cutter = both(body.clone(), flip(tool.clone()));
         for mode in [RepairMode::Repair, RepairMode::KeepLargest] {
             let asked = repair(&cutter, mode).unwrap_err();
             assert!(matches!(asked, InputError::Cutter { count: 1, .. }), "{asked}");
@@ -525,17 +525,14 @@ fn a_body_inside_out_that_overlaps_another_is_asked_about_and_cut_or_united() {
 
 #[test]
 fn a_body_inside_out_beside_another_or_within_it_is_no_cutter() {
-    let beside = both(base(), flipped(ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2)));
+    let beside = both(base(), flip(ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2)));
     assert!(matches!(
         repair(&beside, RepairMode::Repair),
         Err(InputError::Bodies(_))
     ));
-    let touching = both(
-        cube(Vec3::ZERO, 1.0),
-        flipped(cube(Vec3::new(1.0, 0.5, 0.0), 1.0)),
-    );
-    assert!((mended(&touching).solid.volume() - 2.0).abs() < 1e-12);
+    let touching = both(cube(Vec3::ZERO, 1.0), flip(cube(Vec3::new(1.0, 0.5, 0.0), 1.0)));
+    assert!((mend(&touching).solid.volume() - 2.0).abs() < 1e-12);
     // All of it is inside out, so it overlaps only itself.
-    let all = flipped(both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3)));
-    assert_eq!(mended(&all).repairs[0].kind.code(), "body-turned");
+    let all = flip(both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3)));
+    assert_eq!(mend(&all).repairs[0].kind.code(), "body-turned");
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::crossing::crossing_pairs;
 use super::shells::solid_angle;
 use super::{Draft, NEAR_SHARE, Repair, RepairKind};
-use crate::check::{Groups, Side, inspect_edges, open_edges, sides};
+use crate::check::{Groups, TriangleSide, inspect_edges, open_edges, sides};
 use crate::{TriMesh, Vec3};
 
 /// Largest number of solid angles summed to confirm that walls lie inside: some seconds' work. Beyond that,
@@ -57,7 +57,7 @@ pub(super) fn drop_sheets(draft: &mut Draft) -> Option<Repair> {
 pub(super) fn drop_partitions(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
     let sides = sides(mesh);
-    let edges = || sides.chunk_by(Side::same_edge);
+    let edges = || sides.chunk_by(TriangleSide::same_edge);
     if !edges().any(|edge| edge.len() > 2) {
         return None;
     }
@@ -110,7 +110,7 @@ pub(super) fn drop_partitions(draft: &mut Draft) -> Option<Repair> {
 }
 
 /// Joins the sides of triangles that face each other around an edge.
-fn join_around(mesh: &TriMesh, edge: &[Side], cells: &mut Groups) {
+fn join_around(mesh: &TriMesh, edge: &[TriangleSide], cells: &mut Groups) {
     let [low, high] = [edge[0].low, edge[0].high].map(|v| mesh.points[v as usize]);
     let along = (high - low).normalize_or_zero();
     let across = if along == Vec3::ZERO {
@@ -119,7 +119,7 @@ fn join_around(mesh: &TriMesh, edge: &[Side], cells: &mut Groups) {
         along.any_orthonormal_vector()
     };
     let up = along.cross(across);
-    let mut around: Vec<(f64, &Side)> = edge
+    let mut around: Vec<(f64, &TriangleSide)> = edge
         .iter()
         .map(|side| {
             let tip = mesh.triangles[side.face() as usize][(side.corner as usize % 3 + 2) % 3];
@@ -129,7 +129,8 @@ fn join_around(mesh: &TriMesh, edge: &[Side], cells: &mut Groups) {
         .collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.corner.cmp(&b.1.corner)));
     // Seen along the edge, the front of a triangle whose side runs along it lies counter-clockwise.
-    let side_of = |side: &Side, is_next: bool| 2 * side.face() + u32::from(side.runs_up(mesh) != is_next);
+    let side_of =
+        |side: &TriangleSide, is_next: bool| 2 * side.face() + u32::from(side.runs_up(mesh) != is_next);
     for (k, &(_, side)) in around.iter().enumerate() {
         let (_, next) = around[(k + 1) % around.len()];
         cells.unite(side_of(side, true), side_of(next, false));
@@ -166,7 +167,7 @@ fn outer_cells(mesh: &TriMesh, complex: &[u32], cells: &mut Groups) -> Vec<u32> 
 /// Groups of triangles connected across edges of two triangles.
 fn patches(mesh: &TriMesh) -> Groups {
     let mut patches = Groups::of(mesh.triangles.len());
-    for edge in sides(mesh).chunk_by(Side::same_edge) {
+    for edge in sides(mesh).chunk_by(TriangleSide::same_edge) {
         if let [one, other] = edge {
             patches.unite(one.face(), other.face());
         }
@@ -189,7 +190,7 @@ fn shrunk(mesh: &TriMesh, is_sheet: &[bool]) -> TriMesh {
     }
     let mut is_rim = vec![false; mesh.points.len()];
     for edge in sides(mesh)
-        .chunk_by(Side::same_edge)
+        .chunk_by(TriangleSide::same_edge)
         .filter(|edge| edge.len() != 2)
     {
         is_rim[edge[0].low as usize] = true;

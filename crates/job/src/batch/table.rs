@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use shellock_render::escaped;
+use shellock_render::escape;
 
 use super::record::{Record, Status};
 
@@ -69,13 +69,13 @@ fn html(records: &[Record]) -> String {
         } else {
             String::new()
         };
-        let said: Vec<String> = r.said.iter().take(3).map(|said| escaped(said)).collect();
+        let said: Vec<String> = r.said.iter().take(3).map(|said| escape(said)).collect();
         let _ = write!(
             rows,
             "<tr><td>{picture}</td><td>{}</td><td class=\"{s}\">{s}</td><td class=\"n\">{}</td><td \
              class=\"n\">{:.0}</td><td class=\"n\">{}</td><td \
              class=\"n\">{}</td><td><small>{}</small></td></tr>",
-            escaped(&r.model),
+            escape(&r.model),
             r.pieces.map_or(String::new(), |n| n.to_string()),
             r.seconds,
             r.peak_mb.map_or(String::new(), |mb| format!("{mb:.0}")),
@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(quoted("=1+\"a\"\nb"), "\"'=1+\"\"a\"\" b\"");
         assert_eq!(address("a b/\"><script>"), "a%20b/%22%3E%3Cscript%3E");
         assert_eq!(
-            escaped("<img src=x onerror=\"a\">"),
+            escape("<img src=x onerror=\"a\">"),
             "&lt;img src=x onerror=&quot;a&quot;&gt;"
         );
     }

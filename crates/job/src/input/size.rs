@@ -36,7 +36,7 @@ pub(super) fn scale(
         (_, Some(height), ..) => (length("height", height)? / along_up, None),
         (_, _, Some(scale), _) => (length("scale", scale)?, None),
         (.., Some(unit)) => (unit.mm(), None),
-        _ if loaded.unit_is_stated => (own_mm, unusual(own_mm * longest)),
+        _ if loaded.has_unit => (own_mm, unusual(own_mm * longest)),
         _ if is_usual(own_mm * longest) && !is_normalised(loaded.format, longest) => (own_mm, None),
         _ => (DEFAULT_SIZE_MM / longest, Some(guess(loaded, longest))),
     };

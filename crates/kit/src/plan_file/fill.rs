@@ -96,7 +96,7 @@ impl PlanFile {
             gaps: Some(GapsEntry::of(design)),
             effort: Some(design.effort.clone()),
             verification: Some(VerdictEntry {
-                passed: kit.verification.passed(),
+                passed: kit.verification.has_passed(),
                 checks: kit.verification.checks.clone(),
                 findings: Some(kit.verification.findings.clone()),
             }),
@@ -290,11 +290,11 @@ impl PrintingEntry {
     /// for the whole model, if the printer can make it.
     pub fn of(printer: &Printer, plates: &Plates, cost: Cost, whole: Option<Cost>) -> Self {
         let process = Process::ALL.iter().find(|(_, p)| *p == printer.process);
-        let laid = plates.laid.iter().map(|l| LaidEntry {
+        let laid = plates.poses.iter().map(|l| LaidEntry {
             piece: l.piece.into(),
             plate: l.plate + 1,
             size: l.size_mm,
-            turned: l.turned,
+            turned: l.axes,
             moved: l.moved_mm,
             support_mm2: l.support_mm2,
             outer_support_mm2: l.outer_support_mm2,

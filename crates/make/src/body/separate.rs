@@ -7,7 +7,7 @@ use shellock_assembly::LatticeDirection;
 use shellock_geom::band::Band;
 use shellock_geom::decimate::decimate;
 use shellock_geom::level_cut::{Side, cut_at_zero};
-use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
+use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_with_corners};
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
@@ -239,7 +239,7 @@ impl Splitter<'_> {
         } else {
             Corners::Negative
         };
-        let collar = contour_cutting(
+        let collar = contour_with_corners(
             &self.grid.band,
             &self.collar_field(g, sign),
             OffBand::Outside,
@@ -286,7 +286,7 @@ impl Splitter<'_> {
         } else {
             Corners::Positive
         };
-        let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
+        let mesh = contour_with_corners(&self.grid.band, &field, OffBand::Outside, apart);
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
     }
 

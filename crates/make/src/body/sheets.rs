@@ -188,7 +188,7 @@ impl Sample {
 /// Samples a seam, with smoothed frames.
 fn sampled(seam: &shellock_surface::Seam) -> Vec<Sample> {
     let n = (seam.length() / STEP_MM).ceil().max(1.0) as usize;
-    let stations = seam.resampled(n);
+    let stations = seam.resample(n);
     let is_loop = seam.is_loop();
     let n_stations = stations.len();
     let smoothed = |mut values: Vec<Vec3>| {

@@ -99,7 +99,7 @@ fn joints_have_their_clearance_beneath_the_wall_and_twice_the_tolerance_in_the_s
                 (gap(&a, Scope::Everything) - whole_mm).abs() < ROUNDING_MM,
                 "{name}"
             );
-            let beneath = shape(moving).counting(|face| is_beneath_wall(moving, face));
+            let beneath = shape(moving).count_only(|face| is_beneath_wall(moving, face));
             assert!(
                 (gap(&beneath, Scope::WhatCounts) - connector_mm).abs() < ROUNDING_MM,
                 "{name}: {:?}",

@@ -6,7 +6,7 @@
 //! too near is grown by the clearance, swept against the piece's way, and cut from the piece.
 
 use rayon::prelude::*;
-use shellock_geom::clearance::{Passed, Translation, faces_passed};
+use shellock_geom::clearance::{Passed, Translation, find_passed_faces};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
@@ -81,7 +81,7 @@ fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
         from_mm: 0.0,
         far_mm: f64::INFINITY,
     };
-    let passed = faces_passed(&piece.mesh, &earlier.mesh, &way_out, gap_mm - TOLERANCE_MM);
+    let passed = find_passed_faces(&piece.mesh, &earlier.mesh, &way_out, gap_mm - TOLERANCE_MM);
     let flats = flats(&earlier.mesh, &passed);
     let drawn_out = flats
         .iter()
@@ -263,7 +263,7 @@ mod tests {
             far_mm: f64::INFINITY,
         };
         assert_eq!(
-            faces_passed(
+            find_passed_faces(
                 &free.to_mesh(),
                 &overhang.to_mesh(),
                 &way_out,

@@ -70,7 +70,7 @@ impl Region {
     pub(super) fn balance(&self, nodes: &[u32], points: &[Vec3], loads: &mut [f64]) {
         let motion = -self.inertia.solve(&self.resultant(nodes, points, loads));
         for (&v, w) in self.nodes.iter().zip(&self.weights) {
-            let force = self.moved(&motion, points[v as usize]) * *w;
+            let force = self.displacement(&motion, points[v as usize]) * *w;
             add(loads, v, 0, force);
         }
     }
@@ -99,12 +99,17 @@ impl Region {
         let motion = -self.inertia.solve(&moved);
         let turn = Vec3::new(motion[3], motion[4], motion[5]) / self.size;
         for &v in nodes {
-            add(displacements, v, 0, self.moved(&motion, points[v as usize]));
+            add(
+                displacements,
+                v,
+                0,
+                self.displacement(&motion, points[v as usize]),
+            );
             add(displacements, v, 3, turn);
         }
     }
 
-    fn moved(&self, motion: &Vector6<f64>, point: Vec3) -> Vec3 {
+    fn displacement(&self, motion: &Vector6<f64>, point: Vec3) -> Vec3 {
         let (shift, turn) = (
             Vec3::new(motion[0], motion[1], motion[2]),
             Vec3::new(motion[3], motion[4], motion[5]),

@@ -21,7 +21,7 @@ pub struct Support {
     /// Held point of the mesh.
     pub point: u32,
     /// Held displacements along x, y, z, and rotations about them.
-    pub held: [bool; DOFS],
+    pub is_held: [bool; DOFS],
 }
 
 /// Loads on the shell, and the nodes that hold it.
@@ -32,7 +32,7 @@ pub struct LoadCase {
     /// Moment on each point, N·mm; empty if there are none.
     pub moments_n_mm: Vec<Vec3>,
     /// Points held in the mean, weighted by area. Empty if the solver has supports or the loads balance.
-    pub held: Vec<u32>,
+    pub anchors: Vec<u32>,
 }
 
 /// Displacement and rotation of each point.
@@ -63,16 +63,16 @@ impl<'a> ShellSolver<'a> {
             .iter()
             .map(|p| Support {
                 point: p[0],
-                held: [true; DOFS],
+                is_held: [true; DOFS],
             })
             .collect();
         Ok(Self {
             free_parts,
-            ..Self::held(model, thickness_mm, &supports)?
+            ..Self::with_supports(model, thickness_mm, &supports)?
         })
     }
 
-    pub(super) fn held(
+    pub(super) fn with_supports(
         model: &'a ShellModel,
         thickness_mm: f64,
         supports: &[Support],
@@ -86,7 +86,9 @@ impl<'a> ShellSolver<'a> {
                 .get_mut(support.point as usize * DOFS..)
                 .and_then(|d| d.get_mut(..DOFS));
             let dofs = dofs.ok_or(ShellError::MissingSupport(support.point))?;
-            dofs.iter_mut().zip(support.held).for_each(|(d, held)| *d |= held);
+            dofs.iter_mut()
+                .zip(support.is_held)
+                .for_each(|(d, held)| *d |= held);
         }
         for part in model.parts() {
             if !region::holds(&part, &model.points, &is_held) {
@@ -185,10 +187,10 @@ impl<'a> ShellSolver<'a> {
     fn balance(&self, at: usize, case: &LoadCase, loads: &mut [f64]) -> Result<Vec<Region>, ShellError> {
         let model = self.model;
         let mut holds = vec![false; model.points.len()];
-        for &v in &case.held {
+        for &v in &case.anchors {
             *holds.get_mut(v as usize).ok_or(ShellError::MissingSupport(v))? = true;
         }
-        if self.free_parts.is_empty() && !case.held.is_empty() {
+        if self.free_parts.is_empty() && !case.anchors.is_empty() {
             return Err(ShellError::HeldTwice { case: at });
         }
         let mut regions = Vec::new();

@@ -98,7 +98,7 @@ fn forces(model: &ShellModel, h: f64, u: &Displacements) -> LoadCase {
     LoadCase {
         forces_n: loads.chunks(6).map(|l| Vec3::from_slice(&l[..3])).collect(),
         moments_n_mm: loads.chunks(6).map(|l| Vec3::from_slice(&l[3..])).collect(),
-        held: Vec::new(),
+        anchors: Vec::new(),
     }
 }
 
@@ -123,7 +123,7 @@ fn push(mesh: &TriMesh) -> LoadCase {
     let held = (0..).zip(&mesh.points).filter(|(_, p)| p.z > 5.0).map(|(v, _)| v);
     LoadCase {
         forces_n: forces_n.collect(),
-        held: held.collect(),
+        anchors: held.collect(),
         ..LoadCase::default()
     }
 }
@@ -219,7 +219,7 @@ fn a_sphere_under_pressure_has_stress_p_r_over_2_h_at_every_thickness() {
     for (t, corners) in mesh.triangles.iter().enumerate() {
         corners
             .iter()
-            .for_each(|&v| forces_n[v as usize] += mesh.area_vector_doubled(t) * (pressure_mpa / 6.0));
+            .for_each(|&v| forces_n[v as usize] += mesh.double_area_vector(t) * (pressure_mpa / 6.0));
     }
     for thickness_mm in [0.5, 1.0, 2.0] {
         let solver = shell.at_thickness(thickness_mm).unwrap();
@@ -287,11 +287,11 @@ fn a_region_holds_in_the_mean_with_a_reaction_that_is_linear_in_place() {
         .remove(0);
     let areas = model.areas_mm2();
     let (mut shift, mut turn) = (Vec3::ZERO, Vec3::ZERO);
-    for &v in &case.held {
+    for &v in &case.anchors {
         shift += u.moves_mm[v as usize] * areas[v as usize];
         turn += mesh.points[v as usize].cross(u.moves_mm[v as usize]) * areas[v as usize];
     }
-    let area: f64 = case.held.iter().map(|&v| areas[v as usize]).sum();
+    let area: f64 = case.anchors.iter().map(|&v| areas[v as usize]).sum();
     assert!(
         shift.length() < 1e-9 * area * largest(&u.moves_mm)
             && turn.length() < 1e-8 * area * largest(&u.moves_mm)
@@ -306,13 +306,13 @@ fn a_region_holds_in_the_mean_with_a_reaction_that_is_linear_in_place() {
         .map(|(a, b)| *a - *b)
         .collect();
     let scale = largest(&case.forces_n);
-    let is_held = |v: usize| case.held.contains(&(v as u32));
+    let is_held = |v: usize| case.anchors.contains(&(v as u32));
     for v in (0..mesh.points.len()).filter(|&v| !is_held(v)) {
         assert!(reactions[v].length() < 1e-6 * scale, "{v}: {}", reactions[v]);
     }
     assert!(largest(&called_up.moments_n_mm) < 1e-6 * scale);
     // For a traction a + b × x, the difference between two places is perpendicular to their distance.
-    for pair in case.held.windows(2) {
+    for pair in case.anchors.windows(2) {
         let [p, q] = [pair[0], pair[1]].map(|v| v as usize);
         let difference = reactions[p] / areas[p] - reactions[q] / areas[q];
         assert!(difference.dot(mesh.points[p] - mesh.points[q]).abs() < 1e-6 * scale);
@@ -348,18 +348,18 @@ fn supports_carry_what_equilibrium_demands_and_do_not_move() {
     let model = model(&mesh);
     let case = push(&mesh);
     let supports: Vec<Support> = case
-        .held
+        .anchors
         .iter()
         .map(|&point| Support {
             point,
-            held: [true; 6],
+            is_held: [true; 6],
         })
         .collect();
     let case = LoadCase {
-        held: Vec::new(),
+        anchors: Vec::new(),
         ..case
     };
-    let solver = model.at_thickness_held(1.5, &supports).unwrap();
+    let solver = model.at_thickness_with(1.5, &supports).unwrap();
     let u = solver.solve(std::slice::from_ref(&case)).unwrap().remove(0);
     assert!(
         supports
@@ -374,7 +374,7 @@ fn supports_carry_what_equilibrium_demands_and_do_not_move() {
     let load: Vec3 = case.forces_n.iter().sum();
     assert!((reaction + load).length() < 1e-7 * load.length());
     let again = solver.solve(&[LoadCase {
-        held: vec![0],
+        anchors: vec![0],
         ..case
     }]);
     assert_eq!(again.unwrap_err(), ShellError::HeldTwice { case: 0 });
@@ -394,7 +394,7 @@ fn parts_hold_on_their_own() {
     let one = push(&other);
     let mut two = LoadCase {
         forces_n: one.forces_n.clone(),
-        held: one.held.clone(),
+        anchors: one.anchors.clone(),
         ..LoadCase::default()
     };
     two.forces_n.resize(2 * n as usize, Vec3::ZERO);
@@ -479,22 +479,22 @@ fn what_cannot_be_solved_is_refused_by_name() {
     }
     let hinge = [0, 1].map(|point| Support {
         point,
-        held: [true, true, true, false, false, false],
+        is_held: [true, true, true, false, false, false],
     });
     assert_eq!(
-        model.at_thickness_held(1.0, &hinge).unwrap_err(),
+        model.at_thickness_with(1.0, &hinge).unwrap_err(),
         ShellError::Loose(0)
     );
     assert_eq!(
-        model.at_thickness_held(1.0, &[]).unwrap_err(),
+        model.at_thickness_with(1.0, &[]).unwrap_err(),
         ShellError::Loose(0)
     );
     let missing = [Support {
         point: 9999,
-        held: [true; 6],
+        is_held: [true; 6],
     }];
     assert_eq!(
-        model.at_thickness_held(1.0, &missing).unwrap_err(),
+        model.at_thickness_with(1.0, &missing).unwrap_err(),
         ShellError::MissingSupport(9999)
     );
 
@@ -526,15 +526,15 @@ fn what_cannot_be_solved_is_refused_by_name() {
         ShellError::LoadNotFinite { case: 1, point: 5 }
     );
     assert_eq!(
-        refused(&|c| c.held = vec![9999]),
+        refused(&|c| c.anchors = vec![9999]),
         ShellError::MissingSupport(9999)
     );
     assert_eq!(
-        refused(&|c| c.held = vec![0, 1]),
+        refused(&|c| c.anchors = vec![0, 1]),
         ShellError::HeldOnLine { case: 1 }
     );
     assert_eq!(
-        refused(&|c| c.held.clear()),
+        refused(&|c| c.anchors.clear()),
         ShellError::Unbalanced { case: 1, point: 0 }
     );
 }
@@ -552,7 +552,7 @@ fn loads_are_carried_at_every_thickness() {
             .unwrap()
             .remove(0);
         let called_up = forces(&model, thickness_mm, &u);
-        for v in (0..mesh.points.len()).filter(|&v| !case.held.contains(&(v as u32))) {
+        for v in (0..mesh.points.len()).filter(|&v| !case.anchors.contains(&(v as u32))) {
             let missing = called_up.forces_n[v].distance(case.forces_n[v]);
             assert!(missing < 1e-5, "{missing} N at {thickness_mm} mm");
         }

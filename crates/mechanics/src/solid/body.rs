@@ -84,7 +84,7 @@ impl Body {
             });
         }
         let (frame, volume_mm3) = frame_of(&cells, params.cell_mm);
-        let factor = factorised(&cells, elements, params.cell_mm)?;
+        let factor = factorise(&cells, elements, params.cell_mm)?;
         Ok(Self {
             cells,
             frame,
@@ -146,7 +146,7 @@ impl Body {
     }
 
     /// Displacement of a place, mm.
-    pub fn moved(&self, displaced: &[f64], place: &Place) -> Vec3 {
+    pub fn displacement(&self, displaced: &[f64], place: &Place) -> Vec3 {
         let nodes = &self.cells.copies[place.copy as usize].nodes;
         nodes
             .iter()
@@ -198,7 +198,7 @@ fn frame_of(cells: &Cells, cell_mm: f64) -> (Frame, f64) {
 }
 
 /// Factorises the piece's stiffness, held at its frame.
-fn factorised(cells: &Cells, elements: &Elements, cell_mm: f64) -> Result<Cholesky, SolidError> {
+fn factorise(cells: &Cells, elements: &Elements, cell_mm: f64) -> Result<Cholesky, SolidError> {
     let nodes: Vec<[u32; N_NODES]> = cells.copies.iter().map(|c| c.nodes).collect();
     let mut matrix = SparseSymmetric::of_cells(cells.n_nodes, 3, &nodes);
     for copy in &cells.copies {

@@ -76,7 +76,7 @@ fn neighbors(at: usize) -> impl Iterator<Item = usize> {
 
 /// Pairs of voxels that face each other across a cell border: the last layer along `axis`, and the first
 /// layer of the next cell.
-fn facing(axis: usize) -> impl Iterator<Item = (usize, usize)> {
+fn voxel_pairs(axis: usize) -> impl Iterator<Item = (usize, usize)> {
     let step = SIDE.pow(axis as u32);
     (0..N_VOXELS)
         .filter(move |at| at / step % SIDE == SIDE - 1)
@@ -85,7 +85,7 @@ fn facing(axis: usize) -> impl Iterator<Item = (usize, usize)> {
 
 /// Pairs of nodes that coincide: those on a cell's far face along `axis`, and those on the next cell's near
 /// face.
-fn shared(axis: usize) -> impl Iterator<Item = (usize, usize)> {
+fn node_pairs(axis: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..N_NODES).filter(move |i| NODES[*i][axis] == 1).map(move |i| {
         let mut near = NODES[i];
         near[axis] = -1;
@@ -126,16 +126,16 @@ impl Cells {
             loose_share: 0.0,
             first,
         };
-        let mut parent = cells.joined();
+        let mut parent = cells.join_copies();
         cells.keep_largest(&mut parent);
         cells
     }
 
     /// Joins the (copy, node) pairs that coincide, across faces where voxels of both copies meet.
-    fn joined(&self) -> Vec<u32> {
+    fn join_copies(&self) -> Vec<u32> {
         let mut parent: Vec<u32> = (0..(self.copies.len() * N_NODES) as u32).collect();
-        let shared: [Vec<(usize, usize)>; 3] = std::array::from_fn(|axis| shared(axis).collect());
-        let facing: [Vec<(usize, usize)>; 3] = std::array::from_fn(|axis| facing(axis).collect());
+        let shared: [Vec<(usize, usize)>; 3] = std::array::from_fn(|axis| node_pairs(axis).collect());
+        let facing: [Vec<(usize, usize)>; 3] = std::array::from_fn(|axis| voxel_pairs(axis).collect());
         for (at, copy) in self.copies.iter().enumerate() {
             for axis in 0..3 {
                 let mut next = copy.cell;

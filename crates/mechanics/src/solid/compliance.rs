@@ -105,7 +105,7 @@ impl Compliance {
         let body = &self.bodies[part];
         self.seats[part]
             .iter()
-            .map(|seat| body.moved(displaced, &seat.place))
+            .map(|seat| body.displacement(displaced, &seat.place))
             .collect()
     }
 

@@ -14,7 +14,7 @@
 //! unique. The bounds follow the pressures (Haslinger's fixed point).
 
 use shellock_geom::Vec3;
-use shellock_geom::sparse::eliminate_leading;
+use shellock_geom::sparse::eliminate_first;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -148,7 +148,7 @@ impl Problem<'_> {
         for (grip, bound_n) in grips.iter_mut().zip(self.bounds(&start, friction)) {
             grip.bound_n = if bound_n > 0.0 { STUCK_N } else { 0.0 };
         }
-        let (mut state, _) = self.stepped(compliance, &grips, start, STEPS_A_ROUND, SETTLED)?;
+        let (mut state, _) = self.step(compliance, &grips, start, STEPS_A_ROUND, SETTLED)?;
         let mut off = f64::INFINITY;
         for _ in 0..MOST_ROUNDS {
             for (grip, bound_n) in grips.iter_mut().zip(self.bounds(&state, friction)) {
@@ -156,7 +156,7 @@ impl Problem<'_> {
             }
             let unlawful;
             (state, unlawful) =
-                self.stepped(compliance, &grips, state, STEPS_A_ROUND, 0.1 * FRICTION_SETTLED)?;
+                self.step(compliance, &grips, state, STEPS_A_ROUND, 0.1 * FRICTION_SETTLED)?;
             let bounds = self.bounds(&state, friction);
             let change: f64 = grips.iter().zip(bounds).map(|(g, b)| (g.bound_n - b).abs()).sum();
             off = unlawful + change / self.loads.size_n;
@@ -193,9 +193,9 @@ impl Problem<'_> {
                 contacts: &contacts,
                 ..*self
             };
-            (start, _) = softer.stepped(compliance, &free, start, SOFT_STEPS, SOFT_SETTLED)?;
+            (start, _) = softer.step(compliance, &free, start, SOFT_STEPS, SOFT_SETTLED)?;
         }
-        let (state, off) = self.stepped(compliance, &free, start, MOST_STEPS, SETTLED)?;
+        let (state, off) = self.step(compliance, &free, start, MOST_STEPS, SETTLED)?;
         if off > SETTLED {
             return Err(SolidError::Contact);
         }
@@ -204,7 +204,7 @@ impl Problem<'_> {
 
     /// Takes at most `most` Newton steps towards the minimum of the energy for given friction bounds. Also
     /// returns the remaining deviation of the forces from their law, as a share of the load.
-    fn stepped(
+    fn step(
         &self,
         compliance: &mut Compliance,
         grips: &[Grip],
@@ -220,7 +220,7 @@ impl Problem<'_> {
             }
             let rows = rows(contacts, grips, &state);
             compliance.prepare(rows.iter().map(|row| row.contact));
-            let next = solved(compliance, loads, &rows, contacts.len())?;
+            let next = solve(compliance, loads, &rows, contacts.len())?;
             let step = next.less(&state);
             let slope = Slope {
                 contacts,
@@ -262,7 +262,7 @@ fn rows(contacts: &[Contact], grips: &[Grip], state: &State) -> Vec<Row> {
 }
 
 /// Solves the linear system of `rows`.
-fn solved(
+fn solve(
     compliance: &Compliance,
     loads: &Loads,
     rows: &[Row],
@@ -282,8 +282,8 @@ fn solved(
         values[(m + f) * (n + 1)] = -loads.spring;
         side[m + f] = -loads.on_frames[f / 6][f % 6];
     }
-    eliminate_leading(&mut values, n, m)?;
-    let x = back_substituted(&values, n, m, side).ok_or(SolidError::Contact)?;
+    eliminate_first(&mut values, n, m)?;
+    let x = back_substitute(&values, n, m, side).ok_or(SolidError::Contact)?;
 
     let mut force_n = vec![Vec3::ZERO; n_contacts];
     for (row, x) in rows.iter().zip(&x) {
@@ -305,8 +305,8 @@ fn solved(
     })
 }
 
-/// Solves with the factors that `eliminate_leading` left in the matrix.
-fn back_substituted(values: &[f64], n: usize, m: usize, mut x: Vec<f64>) -> Option<Vec<f64>> {
+/// Solves with the factors that `eliminate_first` left in the matrix.
+fn back_substitute(values: &[f64], n: usize, m: usize, mut x: Vec<f64>) -> Option<Vec<f64>> {
     for j in 0..m {
         let column = &values[n * j..n * (j + 1)];
         x[j] /= column[j];

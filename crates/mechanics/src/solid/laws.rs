@@ -47,7 +47,7 @@ pub(super) struct Grip {
 
 /// Direction along which a contact responds: `force = −stiffness · motion + constant`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Answer {
+pub(super) struct Response {
     pub along: Vec3,
     pub stiffness: f64,
 }
@@ -68,9 +68,9 @@ pub(super) fn force(contact: &Contact, grip: &Grip, by: Vec3) -> Vec3 {
 }
 
 /// Directions along which the contact responds, with their stiffness.
-pub(super) fn answers(contact: &Contact, grip: &Grip, by: Vec3) -> Vec<Answer> {
+pub(super) fn answers(contact: &Contact, grip: &Grip, by: Vec3) -> Vec<Response> {
     let k = contact.stiffness;
-    let along = |along: Vec3, stiffness: f64| Answer { along, stiffness };
+    let along = |along: Vec3, stiffness: f64| Response { along, stiffness };
     if contact.is_fast {
         return Vec3::AXES.map(|axis| along(axis, k)).to_vec();
     }

@@ -37,18 +37,18 @@ pub struct Touch {
 }
 
 /// Sample of a face: position, outward normal and area.
-struct Spot {
+struct FaceSample {
     at: Vec3,
     normal: Vec3,
     area_mm2: f64,
 }
 
 /// Calls `each` with the centroids of a face's triangles, subdivided until they are small.
-fn spots(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Spot)) {
+fn spots(mesh: &TriMesh, face: usize, each: &mut impl FnMut(FaceSample)) {
     let [a, b, c] = mesh.corners(face);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / SAMPLE_MM).ceil().max(1.0) as usize;
-    let area = mesh.area_vector_doubled(face);
+    let area = mesh.double_area_vector(face);
     let Some(normal) = area.try_normalize() else {
         return;
     };
@@ -58,13 +58,13 @@ fn spots(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Spot)) {
     for i in 0..n {
         for j in 0..n - i {
             let (x, y) = (i as f64, j as f64);
-            each(Spot {
+            each(FaceSample {
                 at: at(x + third, y + third),
                 normal,
                 area_mm2,
             });
             if i + j + 1 < n {
-                each(Spot {
+                each(FaceSample {
                     at: at(x + 2.0 * third, y + 2.0 * third),
                     normal,
                     area_mm2,
@@ -109,13 +109,13 @@ fn between(
             continue;
         }
         spots(mesh, face, &mut |spot| {
-            let its = |face: u32| other.area_vector_doubled(face as usize).try_normalize();
+            let its = |face: u32| other.double_area_vector(face as usize).try_normalize();
             let nearest = tree.nearest(spot.at, reach_mm * reach_mm);
-            let beside = nearest.and_then(|hit| facing(&spot, hit.point, its(hit.face)?));
+            let beside = nearest.and_then(|hit| common_normal(&spot, hit.point, its(hit.face)?));
             // The nearest point may lie beside the sample, while another face lies in front of it.
             let ahead = || {
                 let (face, far_mm) = tree.first_hit(spot.at, spot.normal, reach_mm)?;
-                facing(&spot, spot.at + far_mm * spot.normal, its(face)?)
+                common_normal(&spot, spot.at + far_mm * spot.normal, its(face)?)
             };
             let Some((normal, gap_mm)) = beside.or_else(ahead) else {
                 return;
@@ -147,7 +147,7 @@ fn between(
 
 /// Common normal of two faces, and the gap along it, negative if they overlap. `None` if they do not face
 /// each other.
-fn facing(spot: &Spot, hit: Vec3, its: Vec3) -> Option<(Vec3, f64)> {
+fn common_normal(spot: &FaceSample, hit: Vec3, its: Vec3) -> Option<(Vec3, f64)> {
     if spot.normal.dot(its) > OPPOSED {
         return None;
     }

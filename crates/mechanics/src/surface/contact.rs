@@ -36,16 +36,16 @@ pub(super) enum Law {
 /// One contact. Its energy is `(g · r)²/2` in the motions r of side a relative to side b; if one-sided, only
 /// for a negative `g · r`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Contact {
+pub(super) struct ContactSpring {
     pub station: usize,
     /// Gradient of the gap times the square root of the stiffness, N/mm.
     pub gradient: Motions,
     pub law: Law,
 }
 
-impl Contact {
+impl ContactSpring {
     /// Share of `gap` that stores energy: all of it, or its negative part.
-    pub fn pressed(&self, gap: f64) -> f64 {
+    pub fn active_gap(&self, gap: f64) -> f64 {
         match self.law {
             Law::Both => gap,
             Law::Push => gap.min(0.0),
@@ -80,13 +80,13 @@ pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motio
 ///
 /// A connector keeps the tips and the seam points together across the channel, and keeps the male's tip from
 /// going deeper. The walls may not enter each other at any station.
-pub(super) fn contacts_at(model: &SurfaceModel, i: usize, meeting: &Meeting) -> [Contact; N_CONTACTS] {
+pub(super) fn contacts_at(model: &SurfaceModel, i: usize, meeting: &Meeting) -> [ContactSpring; N_CONTACTS] {
     let station = &model.assembly.stations[i];
     let size_mm = meeting
         .joint
         .map_or(model.params.connector_mm, |joint| joint.size_mm);
     let root = model.params.contact_n_mm(size_mm, station.length_mm).sqrt();
-    let contact = |gap: Motions, law| Contact {
+    let contact = |gap: Motions, law| ContactSpring {
         station: i,
         gradient: gap.map(|g| root * g),
         law,

@@ -10,7 +10,7 @@
 
 use std::sync::Arc;
 
-use shellock_geom::sparse::{SparseError, eliminate_leading};
+use shellock_geom::sparse::{SparseError, eliminate_first};
 
 use super::contact::Law;
 
@@ -19,7 +19,7 @@ const COST_OF_PLACE: usize = 30;
 
 /// Body as the contacts see it.
 #[derive(Clone, Debug)]
-pub(super) struct Body {
+pub(super) struct ContactBody {
     /// Contacts that the body touches, ascending.
     pub contacts: Vec<u32>,
     /// Opening of each contact under forces in the others, column-major; symmetric.
@@ -31,11 +31,11 @@ pub(super) struct Body {
 struct Joining {
     bodies: Vec<usize>,
     /// Indices of earlier joinings.
-    joined: Vec<usize>,
+    earlier: Vec<usize>,
     /// Eliminated contacts, ascending, all before the kept ones.
-    eliminated: Vec<u32>,
+    inner: Vec<u32>,
     /// Kept contacts, in ascending order.
-    kept: Vec<u32>,
+    outer: Vec<u32>,
 }
 
 /// Contacts of a joining and their matrix, its lower triangle column-major; the leading contacts are
@@ -72,33 +72,33 @@ impl Joinings {
         let mut joinings: Vec<Joining> = Vec::with_capacity(2 * bodies.len());
         let mut live: Vec<Joining> = Vec::with_capacity(bodies.len());
         for (i, body) in bodies.into_iter().enumerate() {
-            let (kept, eliminated): (Vec<u32>, Vec<u32>) =
+            let (outer, inner): (Vec<u32>, Vec<u32>) =
                 body.into_iter().partition(|&c| n_touching[c as usize] > 1);
             live.push(Joining {
                 bodies: vec![i],
-                joined: vec![],
-                eliminated,
-                kept,
+                earlier: vec![],
+                inner,
+                outer,
             });
         }
         while let Some([a, b]) = cheapest_pair(&live) {
             let (second, first) = (live.remove(b), live.remove(a));
-            let (eliminated, new): (Vec<u32>, Vec<u32>) = second
-                .kept
+            let (inner, new): (Vec<u32>, Vec<u32>) = second
+                .outer
                 .iter()
-                .partition(|c| first.kept.binary_search(c).is_ok());
+                .partition(|c| first.outer.binary_search(c).is_ok());
             let others = first
-                .kept
+                .outer
                 .iter()
                 .copied()
-                .filter(|c| eliminated.binary_search(c).is_err());
-            let mut kept: Vec<u32> = others.chain(new).collect();
-            kept.sort_unstable();
+                .filter(|c| inner.binary_search(c).is_err());
+            let mut outer: Vec<u32> = others.chain(new).collect();
+            outer.sort_unstable();
             let mut joint = Joining {
                 bodies: vec![],
-                joined: vec![],
-                eliminated,
-                kept,
+                earlier: vec![],
+                inner,
+                outer,
             };
             for piece in [first, second] {
                 joint.take(piece, &mut joinings);
@@ -107,11 +107,11 @@ impl Joinings {
         }
         joinings.extend(live);
 
-        let order: Vec<u32> = joinings.iter().flat_map(|j| &j.eliminated).copied().collect();
+        let order: Vec<u32> = joinings.iter().flat_map(|j| &j.inner).copied().collect();
         let mut rank = vec![0; n_contacts];
         (0..).zip(&order).for_each(|(i, &c)| rank[c as usize] = i);
         for joining in &mut joinings {
-            for contacts in [&mut joining.eliminated, &mut joining.kept] {
+            for contacts in [&mut joining.inner, &mut joining.outer] {
                 contacts.iter_mut().for_each(|c| *c = rank[*c as usize]);
                 contacts.sort_unstable();
             }
@@ -123,7 +123,7 @@ impl Joinings {
     /// (c + 1) − 1.
     pub fn of_groups(mut self, n: u32) -> Self {
         for joining in &mut self.joinings {
-            for contacts in [&mut joining.eliminated, &mut joining.kept] {
+            for contacts in [&mut joining.inner, &mut joining.outer] {
                 *contacts = contacts.iter().flat_map(|c| n * c..n * (c + 1)).collect();
             }
         }
@@ -133,18 +133,18 @@ impl Joinings {
     /// Joins all bodies. Fronts of bodies that are unchanged since `before` are reused.
     pub fn reduce(
         &self,
-        bodies: &[Arc<Body>],
+        bodies: &[Arc<ContactBody>],
         laws: &[Law],
-        before: Option<(&[Arc<Body>], &Reduced)>,
+        before: Option<(&[Arc<ContactBody>], &Reduced)>,
     ) -> Result<Reduced, SparseError> {
         let mut fronts: Vec<Arc<Front>> = Vec::with_capacity(self.joinings.len());
         let mut place = vec![0; laws.len()];
         let mut is_root = vec![true; self.joinings.len()];
         for (i, joining) in self.joinings.iter().enumerate() {
-            joining.joined.iter().for_each(|j| is_root[*j] = false);
+            joining.earlier.iter().for_each(|j| is_root[*j] = false);
             if let Some((old, reduced)) = before
                 && joining.bodies.iter().all(|b| Arc::ptr_eq(&bodies[*b], &old[*b]))
-                && (joining.joined.iter()).all(|j| Arc::ptr_eq(&fronts[*j], &reduced.fronts[*j]))
+                && (joining.earlier.iter()).all(|j| Arc::ptr_eq(&fronts[*j], &reduced.fronts[*j]))
             {
                 fronts.push(reduced.fronts[i].clone());
                 continue;
@@ -156,11 +156,11 @@ impl Joinings {
             for b in &joining.bodies {
                 front.add_body(&bodies[*b], laws, &place);
             }
-            for j in &joining.joined {
+            for j in &joining.earlier {
                 front.add_joint(&fronts[*j], &place);
             }
             if front.n_eliminated > 0 {
-                eliminate_leading(&mut front.values, front.contacts.len(), front.n_eliminated)?;
+                eliminate_first(&mut front.values, front.contacts.len(), front.n_eliminated)?;
             }
             fronts.push(Arc::new(front));
         }
@@ -235,8 +235,8 @@ fn work(n: usize, n_kept: usize) -> usize {
 fn cheapest_pair(live: &[Joining]) -> Option<[usize; 2]> {
     let n_shared = |x: &[u32], y: &[u32]| x.iter().filter(|c| y.binary_search(c).is_ok()).count();
     let mut best: Option<(usize, [usize; 2])> = None;
-    for (a, Joining { kept: x, .. }) in live.iter().enumerate() {
-        for (b, Joining { kept: y, .. }) in live.iter().enumerate().skip(a + 1) {
+    for (a, Joining { outer: x, .. }) in live.iter().enumerate() {
+        for (b, Joining { outer: y, .. }) in live.iter().enumerate().skip(a + 1) {
             let shared = n_shared(x, y);
             let front = x.len() + y.len() - shared;
             let work = work(front, front - shared);
@@ -250,20 +250,20 @@ fn cheapest_pair(live: &[Joining]) -> Option<[usize; 2]> {
 
 impl Joining {
     fn n_contacts(&self) -> usize {
-        self.eliminated.len() + self.kept.len()
+        self.inner.len() + self.outer.len()
     }
 
     /// Makes `piece` a part of this joining: merged with it if that is cheaper, or as an earlier step.
     fn take(&mut self, piece: Self, joinings: &mut Vec<Self>) {
-        let (n, n_kept, n_more) = (self.n_contacts(), self.kept.len(), piece.eliminated.len());
-        let apart = work(piece.n_contacts(), piece.kept.len()) + work(n, n_kept);
+        let (n, n_kept, n_more) = (self.n_contacts(), self.outer.len(), piece.inner.len());
+        let apart = work(piece.n_contacts(), piece.outer.len()) + work(n, n_kept);
         if work(n + n_more, n_kept) <= apart {
             self.bodies.extend(piece.bodies);
-            self.joined.extend(piece.joined);
-            self.eliminated.extend(piece.eliminated);
+            self.earlier.extend(piece.earlier);
+            self.inner.extend(piece.inner);
         } else {
             joinings.push(piece);
-            self.joined.push(joinings.len() - 1);
+            self.earlier.push(joinings.len() - 1);
         }
     }
 }
@@ -271,16 +271,16 @@ impl Joining {
 impl Front {
     /// Allocates a front for the eliminated contacts, those that wait for other bodies, and all that push.
     /// Zero except for a 1 on the diagonal of each eliminated contact.
-    fn of(joining: &Joining, bodies: &[Arc<Body>], done: &[Arc<Self>], laws: &[Law]) -> Self {
+    fn of(joining: &Joining, bodies: &[Arc<ContactBody>], done: &[Arc<Self>], laws: &[Law]) -> Self {
         let both = |of: &[u32]| {
             let is = |c: &u32| laws[*c as usize] == Law::Both;
             of.iter().copied().filter(is).collect::<Vec<u32>>()
         };
-        let mut contacts = both(&joining.eliminated);
+        let mut contacts = both(&joining.inner);
         let n_eliminated = contacts.len();
-        contacts.extend(both(&joining.kept));
+        contacts.extend(both(&joining.outer));
         let own = joining.bodies.iter().flat_map(|b| &bodies[*b].contacts);
-        let joined = joining.joined.iter().flat_map(|j| &done[*j].contacts);
+        let joined = joining.earlier.iter().flat_map(|j| &done[*j].contacts);
         let mut pushes: Vec<u32> = own
             .chain(joined)
             .copied()
@@ -303,7 +303,7 @@ impl Front {
         self.values[self.contacts.len() * row.min(column) + row.max(column)] += value;
     }
 
-    fn add_body(&mut self, body: &Body, laws: &[Law], place: &[usize]) {
+    fn add_body(&mut self, body: &ContactBody, laws: &[Law], place: &[usize]) {
         let m = body.contacts.len();
         let there: Vec<(usize, usize)> = (body.contacts.iter().enumerate())
             .filter(|(_, c)| laws[**c as usize] != Law::Absent)
@@ -361,11 +361,11 @@ mod tests {
         sorted.sort_unstable();
         assert_eq!(sorted, (0..n).collect::<Vec<_>>());
         let wave = |i: usize, j: usize| ((7 * i + 13 * j + i * j) as f64).sin();
-        let bodies: Vec<Arc<Body>> = (touched.iter())
+        let bodies: Vec<Arc<ContactBody>> = (touched.iter())
             .map(|own| {
                 let contacts: Vec<u32> = (0..n).filter(|i| own.contains(&order[*i as usize])).collect();
                 let root = DMatrix::from_fn(contacts.len(), contacts.len(), wave);
-                Arc::new(Body {
+                Arc::new(ContactBody {
                     contacts,
                     compliance: (&root * root.transpose()).as_slice().to_vec(),
                 })
@@ -404,7 +404,7 @@ mod tests {
         let body = |own: &Vec<u32>, soft: f64| {
             let contacts: Vec<u32> = (0..n).filter(|i| own.contains(&order[*i as usize])).collect();
             let root = DMatrix::from_fn(contacts.len(), contacts.len(), |i, j| ((3 * i + j) as f64).cos());
-            Arc::new(Body {
+            Arc::new(ContactBody {
                 contacts,
                 compliance: (soft * &root * root.transpose()).as_slice().to_vec(),
             })
@@ -412,7 +412,7 @@ mod tests {
         let laws: Vec<Law> = (0..n)
             .map(|i| if i % 2 == 0 { Law::Both } else { Law::Push })
             .collect();
-        let before: Vec<Arc<Body>> = touched.iter().map(|own| body(own, 1.0)).collect();
+        let before: Vec<Arc<ContactBody>> = touched.iter().map(|own| body(own, 1.0)).collect();
         let reduced = joinings.reduce(&before, &laws, None).unwrap();
         for changed in 0..before.len() {
             let mut after = before.clone();

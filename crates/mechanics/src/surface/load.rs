@@ -11,7 +11,7 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
 use super::SurfaceModel;
-use super::contact::{Contact, N_CONTACTS, TIP};
+use super::contact::{ContactSpring, N_CONTACTS, TIP};
 use super::parts::{N_MOTIONS, mid_wall};
 use super::solve::{Balance, Jointed, Load, openings};
 use crate::assembly::{Meeting, Opening};
@@ -42,7 +42,7 @@ pub struct Closed(Vec<bool>);
 
 impl Closed {
     fn of(balance: &Balance) -> Self {
-        Self(balance.borne.iter().map(|b| *b < 0.0).collect())
+        Self(balance.forces.iter().map(|b| *b < 0.0).collect())
     }
 }
 
@@ -53,8 +53,8 @@ pub struct JoinedParts<'a>(Jointed<'a>);
 
 impl JoinedParts<'_> {
     /// Joins the same parts by another plan. Parts whose seams are unchanged are not computed again.
-    pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
-        self.0.changed(plan).map(Self)
+    pub fn rejoin(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
+        self.0.rejoin(plan).map(Self)
     }
 
     /// Computes the response to `load`, where `plan` is the plan that joins the parts. The result does not
@@ -72,15 +72,11 @@ impl JoinedParts<'_> {
 
     /// Computes the openings under the separation force. No part is held, since the pulls of all seams
     /// balance.
-    pub fn pulled(
-        &self,
-        plan: &[Meeting],
-        closed: Option<&Closed>,
-    ) -> Result<(Opening, Closed), SparseError> {
+    pub fn pull(&self, plan: &[Meeting], closed: Option<&Closed>) -> Result<(Opening, Closed), SparseError> {
         let model = self.0.model;
         let load = Load::of_pulls(model, plan, &model.pulls(plan));
         let balance = self.0.balance(&load, closed.map(|c| &c.0[..]))?;
-        let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
+        let opening = Opening::rate(plan, openings(model, plan, &balance.motions));
         Ok((opening, Closed::of(&balance)))
     }
 
@@ -98,10 +94,10 @@ impl JoinedParts<'_> {
         let load = model.drift(forces_n).0;
         let balance = self.0.balance(&load, closed.map(|c| &c.0[..]))?;
         let points = mid_wall(&model.params, &model.assembly);
-        let balanced_n = model.balanced(&points, forces_n);
+        let balanced_n = model.balance_forces(&points, forces_n);
         let mut moved_mm = vec![Vec3::ZERO; points.len()];
         for part in &model.parts {
-            let own = part.moved(&points, &balanced_n, &balance.sent);
+            let own = part.displacements(&points, &balanced_n, &balance.sent);
             own.into_iter()
                 .for_each(|(v, moved)| moved_mm[v as usize] = moved);
         }
@@ -121,7 +117,7 @@ impl SurfaceModel {
     pub fn drift(&self, forces_n: &[Vec3]) -> Drift {
         let points = mid_wall(&self.params, &self.assembly);
         assert_eq!(forces_n.len(), points.len(), "one force for each point");
-        let balanced_n = self.balanced(&points, forces_n);
+        let balanced_n = self.balance_forces(&points, forces_n);
         let mut drift = vec![[0.0; N_MOTIONS]; self.assembly.stations.len()];
         for part in &self.parts {
             let own = part.drift(&points, &balanced_n);
@@ -139,7 +135,7 @@ impl SurfaceModel {
     /// Computes the response of the parts joined by `plan` to each of `loads`. Only the model's held points
     /// are held.
     pub fn bear(&self, plan: &[Meeting], loads: &[Drift]) -> Result<Vec<Bearing>, SparseError> {
-        let joined = self.joined(plan)?;
+        let joined = self.join(plan)?;
         loads
             .iter()
             .map(|load| joined.bear(plan, load, None).map(|found| found.0))
@@ -147,15 +143,15 @@ impl SurfaceModel {
     }
 
     /// Joins the parts by `plan`, ready for loads.
-    pub fn joined(&self, plan: &[Meeting]) -> Result<JoinedParts<'_>, SparseError> {
+    pub fn join(&self, plan: &[Meeting]) -> Result<JoinedParts<'_>, SparseError> {
         Jointed::new(self, &self.free, plan).map(JoinedParts)
     }
 
-    fn bearing(&self, plan: &[Meeting], contacts: &[Contact], balance: &Balance) -> Bearing {
+    fn bearing(&self, plan: &[Meeting], contacts: &[ContactSpring], balance: &Balance) -> Bearing {
         let mut pin_mpa = vec![0.0_f64; plan.len()];
         let own = contacts
             .chunks_exact(N_CONTACTS)
-            .zip(balance.borne.chunks_exact(N_CONTACTS));
+            .zip(balance.forces.chunks_exact(N_CONTACTS));
         for (contacts, borne) in own {
             let i = contacts[TIP].station;
             let Some(joint) = plan[i].joint else { continue };
@@ -165,7 +161,7 @@ impl SurfaceModel {
             pin_mpa[i] = 6.0 * (root * borne[TIP]).abs() / length_mm * depth / thickness.powi(2);
         }
         Bearing {
-            opening_mm: openings(self, plan, &balance.moved),
+            opening_mm: openings(self, plan, &balance.motions),
             pin_mpa,
             length_mm: self.assembly.stations.iter().map(|s| s.length_mm).collect(),
             n_iterations: balance.n_iterations,
@@ -174,7 +170,7 @@ impl SurfaceModel {
     }
 
     /// Forces plus the inertia forces of the walls, which are added only if no point is held.
-    fn balanced(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<Vec3> {
+    fn balance_forces(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<Vec3> {
         let mut balanced_n = forces_n.to_vec();
         if self.is_held {
             return balanced_n;

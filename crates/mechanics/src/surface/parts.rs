@@ -58,7 +58,7 @@ struct Inside {
     rows: Vec<(u32, u32)>,
     /// Gradients of the stations' motions at the part's points.
     gradients: Vec<Gradient>,
-    floating: Option<Floating>,
+    ground: Option<Floating>,
 }
 
 /// Part without held points, on ground springs.
@@ -197,11 +197,11 @@ fn part(
     for i in 0..m {
         compliance[(i, i)] += least_compliance(params);
     }
-    let floating = (!floats.is_empty()).then(|| Floating {
+    let ground = (!floats.is_empty()).then(|| Floating {
         rigid: DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j)),
         ground_n_mm: GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64,
     });
-    if let Some(Floating { rigid, ground_n_mm }) = &floating {
+    if let Some(Floating { rigid, ground_n_mm }) = &ground {
         compliance += rigid * rigid.transpose() / *ground_n_mm;
     }
     let rows = own
@@ -215,7 +215,7 @@ fn part(
             factor,
             rows,
             gradients,
-            floating,
+            ground,
         },
     })
 }
@@ -228,7 +228,7 @@ impl Part {
             factor,
             rows,
             gradients,
-            floating,
+            ground,
         } = &self.inside;
         let mut moved = vec![0.0; factor.n_rows()];
         rows.iter()
@@ -242,7 +242,7 @@ impl Part {
             gradient.iter().map(at).sum::<f64>()
         };
         let mut drift: Vec<f64> = gradients.iter().map(along).collect();
-        if let Some(Floating { rigid, ground_n_mm }) = floating {
+        if let Some(Floating { rigid, ground_n_mm }) = ground {
             let own: Gradient = rows.iter().map(|&(v, _)| (v, forces_n[v as usize])).collect();
             for j in 0..6 {
                 let shift = rigid_motion(points, &own, j) / ground_n_mm;
@@ -257,12 +257,12 @@ impl Part {
 
     /// Displacement of each free point of the part, mm, under `forces_n` on all points of the assembly at
     /// mid-wall and the forces `sent` between the sides of all stations.
-    pub fn moved(&self, points: &[Vec3], forces_n: &[Vec3], sent: &[Motions]) -> Vec<(u32, Vec3)> {
+    pub fn displacements(&self, points: &[Vec3], forces_n: &[Vec3], sent: &[Motions]) -> Vec<(u32, Vec3)> {
         let Inside {
             factor,
             rows,
             gradients,
-            floating,
+            ground,
         } = &self.inside;
         let mut own: Gradient = rows.iter().map(|&(v, _)| (v, forces_n[v as usize])).collect();
         let sent = self.stations.iter().flat_map(|s| sent[*s as usize]);
@@ -278,7 +278,7 @@ impl Part {
             .zip(&own)
             .for_each(|(&(_, r), &(_, force))| add(&mut bent, Some(r), force));
         factor.solve_in_place(&mut bent);
-        let rigid: [f64; 6] = std::array::from_fn(|j| match floating {
+        let rigid: [f64; 6] = std::array::from_fn(|j| match ground {
             Some(Floating { ground_n_mm, .. }) => rigid_motion(points, &own, j) / ground_n_mm,
             None => 0.0,
         });

@@ -9,10 +9,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use shellock_geom::Vec3;
-use shellock_geom::sparse::{SparseError, eliminate_leading};
+use shellock_geom::sparse::{SparseError, eliminate_first};
 
-use super::contact::{Contact, Law, N_CONTACTS, contacts_at, forces, gap};
-use super::join::{Body, Joinings, Reduced};
+use super::contact::{ContactSpring, Law, N_CONTACTS, contacts_at, forces, gap};
+use super::join::{ContactBody, Joinings, Reduced};
 use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceParams, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Side, Station};
@@ -33,7 +33,7 @@ pub(super) fn solve(
     let layout = model.layout(is_held);
     let load = Load::of_pulls(model, plan, pulls);
     let balance = Jointed::new(model, &layout, plan)?.balance(&load, None)?;
-    let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
+    let opening = Opening::rate(plan, openings(model, plan, &balance.motions));
     let part_of = |p: u32| model.assembly.part_of_point[p as usize];
     let is_free = |part: &u32| !is_held.get(*part as usize).is_some_and(|h| *h);
     let resistance = opening.resistance(plan, |station| {
@@ -78,17 +78,17 @@ impl Load {
 #[derive(Debug)]
 pub(super) struct Layout {
     is_held: Vec<bool>,
-    touched: Vec<Touched>,
+    bodies: Vec<Touched>,
     joinings: Joinings,
     /// Rank of each station in the elimination order; its N_CONTACTS contacts follow each other.
     rank: Vec<usize>,
     /// Compliance that the held parts add at each station, mm/N.
-    given: Vec<f64>,
+    held_compliance: Vec<f64>,
 }
 
 impl Layout {
     pub fn new(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Self {
-        let touched = touched(parts, n_stations, is_held);
+        let touched = find_bodies(parts, n_stations, is_held);
         let (joinings, order) =
             Joinings::new(touched.iter().map(|t| t.stations.clone()).collect(), n_stations);
         let mut rank = vec![0; n_stations];
@@ -96,8 +96,8 @@ impl Layout {
         Self {
             is_held: is_held.to_vec(),
             joinings: joinings.of_groups(N_CONTACTS as u32),
-            given: given(parts, n_stations, is_held, held_mm_n),
-            touched,
+            held_compliance: station_compliance(parts, n_stations, is_held, held_mm_n),
+            bodies: touched,
             rank,
         }
     }
@@ -109,18 +109,18 @@ pub(super) struct Jointed<'a> {
     pub model: &'a SurfaceModel,
     layout: &'a Layout,
     /// Contacts, in the order in which they are eliminated.
-    pub contacts: Vec<Contact>,
-    bodies: Vec<Arc<Body>>,
-    reduced: Arc<Reduced>,
+    pub contacts: Vec<ContactSpring>,
+    bodies: Vec<Arc<ContactBody>>,
+    reduction: Arc<Reduced>,
 }
 
 /// State of least energy under a load.
 #[derive(Clone, Debug)]
 pub(super) struct Balance {
     /// Motion of side a relative to side b at each station.
-    pub moved: Vec<Motions>,
+    pub motions: Vec<Motions>,
     /// Force of each contact, in the square root of its stiffness times mm.
-    pub borne: Vec<f64>,
+    pub forces: Vec<f64>,
     /// Forces between the sides of each station, including those of the contacts.
     pub sent: Vec<Motions>,
     /// Number of Newton steps taken.
@@ -132,37 +132,37 @@ pub(super) struct Balance {
 impl<'a> Jointed<'a> {
     pub fn new(model: &'a SurfaceModel, layout: &'a Layout, plan: &[Meeting]) -> Result<Self, SparseError> {
         let contacts = contacts(model, layout, plan);
-        let bodies = (layout.touched.iter())
+        let bodies = (layout.bodies.iter())
             .map(|t| Arc::new(body(model, layout, t, &contacts)))
             .collect();
         Self::of(model, layout, contacts, bodies, None)
     }
 
     /// Joins by another plan; parts whose contacts are unchanged are not computed again.
-    pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
+    pub fn rejoin(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
         let contacts = contacts(self.model, self.layout, plan);
         let is_same = |s: &u32| {
             let own = own_contacts(self.layout, *s);
             contacts[own.clone()] == self.contacts[own]
         };
-        let again = |(t, old): (&Touched, &Arc<Body>)| {
+        let again = |(t, old): (&Touched, &Arc<ContactBody>)| {
             if t.stations.iter().all(is_same) {
                 old.clone()
             } else {
                 Arc::new(body(self.model, self.layout, t, &contacts))
             }
         };
-        let bodies = self.layout.touched.iter().zip(&self.bodies).map(again).collect();
-        let before = Some((&self.bodies[..], &*self.reduced));
+        let bodies = self.layout.bodies.iter().zip(&self.bodies).map(again).collect();
+        let before = Some((&self.bodies[..], &*self.reduction));
         Self::of(self.model, self.layout, contacts, bodies, before)
     }
 
     fn of(
         model: &'a SurfaceModel,
         layout: &'a Layout,
-        contacts: Vec<Contact>,
-        bodies: Vec<Arc<Body>>,
-        before: Option<(&[Arc<Body>], &Reduced)>,
+        contacts: Vec<ContactSpring>,
+        bodies: Vec<Arc<ContactBody>>,
+        before: Option<(&[Arc<ContactBody>], &Reduced)>,
     ) -> Result<Self, SparseError> {
         let laws: Vec<Law> = contacts.iter().map(|c| c.law).collect();
         let reduced = Arc::new(layout.joinings.reduce(&bodies, &laws, before)?);
@@ -171,7 +171,7 @@ impl<'a> Jointed<'a> {
             layout,
             contacts,
             bodies,
-            reduced,
+            reduction: reduced,
         })
     }
 
@@ -183,12 +183,15 @@ impl<'a> Jointed<'a> {
             model,
             layout: Layout { is_held, .. },
             contacts,
-            reduced,
+            reduction: reduced,
             ..
         } = self;
-        let mut all = gaps(contacts, &added(&load.drift, answer(model, is_held, &load.sent)));
+        let mut all = gaps(
+            contacts,
+            &add_motions(&load.drift, answer(model, is_held, &load.sent)),
+        );
         reduced.begin(&mut all);
-        let pushing: Vec<Contact> = reduced.pushes.iter().map(|c| contacts[*c as usize]).collect();
+        let pushing: Vec<ContactSpring> = reduced.pushes.iter().map(|c| contacts[*c as usize]).collect();
         let mut gaps: Vec<f64> = reduced.pushes.iter().map(|c| all[*c as usize]).collect();
         let mut borne = vec![0.0; gaps.len()];
         let mut is_closed: Vec<bool> = match closed {
@@ -198,7 +201,7 @@ impl<'a> Jointed<'a> {
         let (mut n_iterations, mut error) = (0, if load.scale_n > 0.0 { 1.0 } else { 0.0 });
         while error > model.params.tolerance && n_iterations < model.params.max_iterations {
             let step = step(&reduced.compliance, &is_closed, &borne, &gaps)?;
-            let opened = opened(&reduced.compliance, &step);
+            let opened = open_gaps(&reduced.compliance, &step);
             let length = if n_iterations == 0 {
                 1.0
             } else {
@@ -206,7 +209,7 @@ impl<'a> Jointed<'a> {
             };
             borne.iter_mut().zip(&step).for_each(|(b, s)| *b += length * s);
             gaps.iter_mut().zip(&opened).for_each(|(g, o)| *g += length * o);
-            let pressed = pushing.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
+            let pressed = pushing.iter().zip(&gaps).map(|(c, g)| c.active_gap(*g));
             let left: Vec<f64> = borne.iter().zip(pressed).map(|(b, p)| b - p).collect();
             error = norm(&less(&pushing, vec![[0.0; N_MOTIONS]; load.sent.len()], &left)) / load.scale_n;
             is_closed = pushing.iter().zip(&gaps).map(|(c, g)| c.is_closed(*g)).collect();
@@ -220,8 +223,8 @@ impl<'a> Jointed<'a> {
         reduced.finish(&mut all);
         let sent = less(contacts, load.sent.clone(), &all);
         Ok(Balance {
-            moved: added(&load.drift, answer(model, is_held, &sent)),
-            borne: all,
+            motions: add_motions(&load.drift, answer(model, is_held, &sent)),
+            forces: all,
             sent,
             n_iterations,
             error,
@@ -236,8 +239,8 @@ fn own_contacts(layout: &Layout, station: u32) -> Range<usize> {
 }
 
 /// Contacts of a plan, in the order in which they are eliminated.
-fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<Contact> {
-    let mut contacts: Vec<Option<Contact>> = vec![None; N_CONTACTS * plan.len()];
+fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<ContactSpring> {
+    let mut contacts: Vec<Option<ContactSpring>> = vec![None; N_CONTACTS * plan.len()];
     for (i, meeting) in plan.iter().enumerate() {
         let own = contacts[own_contacts(layout, i as u32)].iter_mut();
         own.zip(contacts_at(model, i, meeting))
@@ -246,7 +249,7 @@ fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<Cont
     contacts.into_iter().flatten().collect()
 }
 
-fn added(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
+fn add_motions(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
     motions.iter_mut().zip(to).for_each(|(m, t)| add(m, 1.0, t));
     motions
 }
@@ -266,7 +269,7 @@ fn step(
         .zip(is_closed)
         .map(|(b, closed)| if *closed { 0.0 } else { -b })
         .collect();
-    let opened = opened(compliance, &step);
+    let opened = open_gaps(compliance, &step);
     let closed: Vec<usize> = (0..n).filter(|i| is_closed[*i]).collect();
     // The lower triangle is column-major, with the right-hand side as the last row.
     let m = closed.len() + 1;
@@ -283,7 +286,7 @@ fn step(
         target[j] += 1.0;
         target[m - 1] = opened[column] + gaps[column] - borne[column];
     }
-    eliminate_leading(&mut values, m, m - 1)?;
+    eliminate_first(&mut values, m, m - 1)?;
     for j in (0..m - 1).rev() {
         let column = &values[m * j..m * (j + 1)];
         let known: f64 = (closed[j + 1..].iter().zip(&column[j + 1..]))
@@ -295,13 +298,13 @@ fn step(
 }
 
 /// Step length with the least energy, from the contact forces and gaps, and the changes of both by the step.
-fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f64]; 2]) -> f64 {
+fn length(contacts: &[ContactSpring], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f64]; 2]) -> f64 {
     let (mut length, mut first) = (0.0, None);
     for _ in 0..LINE_STEPS {
         let (mut slope, mut curve) = (0.0, 0.0);
         for (i, contact) in contacts.iter().enumerate() {
             let gap = gaps[i] + length * opened[i];
-            let pressed = contact.pressed(gap);
+            let pressed = contact.active_gap(gap);
             slope += (pressed - borne[i] - length * step[i]) * opened[i];
             let is_pressed = contact.law == Law::Both || (contact.law == Law::Push && gap < 0.0);
             let stiffness = if is_pressed { opened[i] } else { 0.0 };
@@ -358,7 +361,7 @@ struct Touched {
     part: Option<usize>,
 }
 
-fn touched(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> {
+fn find_bodies(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> {
     let is_held = |part: usize| is_held.get(part).is_some_and(|h| *h);
     let mut touched: Vec<_> = (parts.iter().enumerate())
         .filter(|(i, _)| !is_held(*i))
@@ -381,7 +384,7 @@ fn touched(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> 
 }
 
 /// Compliance that the held parts add at each station, mm/N.
-fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Vec<f64> {
+fn station_compliance(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Vec<f64> {
     let mut given = vec![0.0; n_stations];
     for (part, _) in parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
         part.stations.iter().for_each(|s| given[*s as usize] += held_mm_n);
@@ -390,7 +393,7 @@ fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) ->
 }
 
 /// Body as seen by the contacts, with the compliance that held parts add.
-fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Contact]) -> Body {
+fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[ContactSpring]) -> ContactBody {
     let n = N_MOTIONS * touched.stations.len();
     // Stations in the order of the contacts, with the offset of each station in the part.
     let mut stations: Vec<(Range<usize>, usize)> = touched
@@ -422,7 +425,7 @@ fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Co
                 .for_each(|(column, g)| add(&mut moved, *g, column));
             add(
                 &mut moved[*place..],
-                layout.given[contact.station],
+                layout.held_compliance[contact.station],
                 &contact.gradient,
             );
             for (range, place) in &stations {
@@ -431,14 +434,14 @@ fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Co
             }
         }
     }
-    Body {
+    ContactBody {
         contacts: ids,
         compliance,
     }
 }
 
 /// Changes of the gaps when the contact forces grow by `borne`.
-fn opened(compliance: &[f64], borne: &[f64]) -> Vec<f64> {
+fn open_gaps(compliance: &[f64], borne: &[f64]) -> Vec<f64> {
     let n = borne.len();
     let mut opened = vec![0.0; n];
     for (column, b) in compliance.chunks_exact(n.max(1)).zip(borne) {
@@ -449,15 +452,15 @@ fn opened(compliance: &[f64], borne: &[f64]) -> Vec<f64> {
     opened
 }
 
-fn gaps(contacts: &[Contact], moved: &[Motions]) -> Vec<f64> {
+fn gaps(contacts: &[ContactSpring], motions: &[Motions]) -> Vec<f64> {
     contacts
         .iter()
-        .map(|c| dot(&c.gradient, &moved[c.station]))
+        .map(|c| dot(&c.gradient, &motions[c.station]))
         .collect()
 }
 
 /// Subtracts the contact forces from `force`.
-fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Motions> {
+fn less(contacts: &[ContactSpring], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Motions> {
     contacts
         .iter()
         .zip(borne)
@@ -466,7 +469,7 @@ fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Mot
 }
 
 /// Distances between the tips of both sides, mm; 0 where there is no joint.
-pub(super) fn openings(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Vec<f64> {
+pub(super) fn openings(model: &SurfaceModel, plan: &[Meeting], motions: &[Motions]) -> Vec<f64> {
     let opening = |((station, m), moved): ((&Station, &Meeting), &Motions)| {
         let Some(joint) = m.joint else { return 0.0 };
         let along = |g| {
@@ -478,7 +481,7 @@ pub(super) fn openings(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]
         Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
     };
     let stations = model.assembly.stations.iter();
-    stations.zip(plan).zip(moved).map(opening).collect()
+    stations.zip(plan).zip(motions).map(opening).collect()
 }
 
 fn add(to: &mut [f64], factor: f64, x: &[f64]) {

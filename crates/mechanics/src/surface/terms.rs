@@ -24,7 +24,7 @@ impl Term {
 }
 
 /// Bending stiffness of a plate of thickness `thickness_mm`, N mm.
-pub(super) fn bending(params: &SurfaceParams, thickness_mm: f64) -> f64 {
+pub(super) fn bending_stiffness(params: &SurfaceParams, thickness_mm: f64) -> f64 {
     let m = &params.material;
     m.youngs_modulus_mpa * thickness_mm.powi(3) / (12.0 * (1.0 - m.poissons_ratio.powi(2)))
 }
@@ -82,7 +82,7 @@ pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, poin
         }
     }
     edges.sort_by_key(|e| (e.0, e.1));
-    let plate = params.stiffness_ratios[1] * bending(params, params.wall_mm);
+    let plate = params.stiffness_ratios[1] * bending_stiffness(params, params.wall_mm);
     let mut terms = Vec::with_capacity(edges.len());
     for same in edges.chunk_by(|x, y| x.0 == y.0) {
         let ends = same[0].0;

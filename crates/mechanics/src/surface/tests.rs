@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 use shellock_geom::Vec3;
 
-use super::contact::{Contact, contacts_at, forces};
+use super::contact::{ContactSpring, contacts_at, forces};
 use super::parts::Motions;
 use super::terms::{Root, Term, patch_terms};
 use super::*;
@@ -35,7 +35,7 @@ fn joints(leaves: Vec3, pull: Vec3) -> Vec<Meeting> {
     ]
 }
 
-fn pulled(model: &SurfaceModel, plan: &[Meeting]) -> SurfaceSolution {
+fn pull_apart(model: &SurfaceModel, plan: &[Meeting]) -> SurfaceSolution {
     model.respond(plan, &model.pulls(plan)).unwrap()
 }
 
@@ -76,14 +76,14 @@ fn rigid_motions_cost_nothing_and_stretching_costs_about_as_much_as_in_a_plate()
 #[test]
 fn a_joint_opens_along_its_direction_and_hardly_across_it() {
     let model = plates(&SurfaceParams::default());
-    let free = opening(&pulled(&model, &joints(Vec3::Z, Vec3::Z)));
-    let pushed = opening(&pulled(&model, &joints(Vec3::Z, -Vec3::Z)));
-    let across = opening(&pulled(&model, &joints(Vec3::Z, Vec3::Y)));
+    let free = opening(&pull_apart(&model, &joints(Vec3::Z, Vec3::Z)));
+    let pushed = opening(&pull_apart(&model, &joints(Vec3::Z, -Vec3::Z)));
+    let across = opening(&pull_apart(&model, &joints(Vec3::Z, Vec3::Y)));
     assert!(
         free > 10.0 * pushed && free > 10.0 * across,
         "{free} {pushed} {across}"
     );
-    let sideways = opening(&pulled(&model, &joints(-Vec3::Y, Vec3::Z)));
+    let sideways = opening(&pull_apart(&model, &joints(-Vec3::Y, Vec3::Z)));
     assert!(free > 5.0 * sideways, "{free} {sideways}");
 }
 
@@ -169,7 +169,7 @@ fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
             .into_iter()
             .map(|m| Meeting { wall, ..m })
             .collect();
-        opening(&pulled(&model, &plan))
+        opening(&pull_apart(&model, &plan))
     };
     let (open, blocked) = (opened(-Vec3::Z), opened(Vec3::Z));
     assert!(open > 1e-3 && blocked < 0.1 * open, "{blocked} mm of {open} mm");
@@ -191,7 +191,7 @@ fn friction_holds_a_pin_out_of_its_channel_and_along_it() {
         plan.iter_mut()
             .filter_map(|m| m.joint.as_mut())
             .for_each(|joint| joint.is_fast = is_fast);
-        opening(&pulled(&model, &plan))
+        opening(&pull_apart(&model, &plan))
     };
     for along in [Vec3::Z, Vec3::X] {
         let [free, held] = [false, true].map(|is_fast| opened(along, is_fast));
@@ -208,14 +208,14 @@ fn friction_holds_a_pin_out_of_its_channel_and_along_it() {
 #[test]
 fn openings_grow_with_the_force_and_fall_with_the_modulus() {
     let params = SurfaceParams::default();
-    let one = opening(&pulled(
+    let one = opening(&pull_apart(
         &plates(&params),
         &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8)),
     ));
     let mut stiff = params;
     stiff.material.youngs_modulus_mpa *= 2.0;
     stiff.force_n_per_mm *= 3.0;
-    let other = opening(&pulled(
+    let other = opening(&pull_apart(
         &plates(&stiff),
         &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8)),
     ));
@@ -225,14 +225,14 @@ fn openings_grow_with_the_force_and_fall_with_the_modulus() {
 #[test]
 fn forces_are_in_balance_and_a_finer_tolerance_changes_nothing() {
     let plan = joints(Vec3::new(0.0, -0.6, 0.8), Vec3::new(0.3, 0.5, 0.8));
-    let coarse = pulled(
+    let coarse = pull_apart(
         &plates(&SurfaceParams {
             tolerance: 1e-3,
             ..SurfaceParams::default()
         }),
         &plan,
     );
-    let fine = pulled(
+    let fine = pull_apart(
         &plates(&SurfaceParams {
             tolerance: 5e-4,
             ..SurfaceParams::default()
@@ -257,15 +257,20 @@ fn stiffness(model: &SurfaceModel) -> DMatrix<f64> {
 }
 
 /// Energy of the stations' motions, N mm.
-fn energy(model: &SurfaceModel, plan: &[Meeting], stiffness: &DMatrix<f64>, moved: &[Motions]) -> f64 {
+fn energy(model: &SurfaceModel, plan: &[Meeting], stiffness: &DMatrix<f64>, motions: &[Motions]) -> f64 {
     let [all, force] =
-        [moved, &forces(model, plan, &model.pulls(plan))].map(|m| DVector::from_vec(m.concat()));
-    let of_contact = |c: &Contact| {
-        let gap = c.gradient.iter().zip(moved[c.station]).map(|(g, r)| g * r).sum();
-        0.5 * c.pressed(gap).powi(2)
+        [motions, &forces(model, plan, &model.pulls(plan))].map(|m| DVector::from_vec(m.concat()));
+    let of_contact = |c: &ContactSpring| {
+        let gap = c
+            .gradient
+            .iter()
+            .zip(motions[c.station])
+            .map(|(g, r)| g * r)
+            .sum();
+        0.5 * c.active_gap(gap).powi(2)
     };
     let contacts = (0..plan.len()).flat_map(|i| contacts_at(model, i, &plan[i]));
-    let contacts: Vec<Contact> = contacts.collect();
+    let contacts: Vec<ContactSpring> = contacts.collect();
     0.5 * all.dot(&(stiffness * &all)) - all.dot(&force) + contacts.iter().map(of_contact).sum::<f64>()
 }
 
@@ -275,7 +280,7 @@ fn no_motion_of_a_single_station_lowers_the_energy() {
     let plan = joints(Vec3::new(0.0, -0.6, 0.8), Vec3::new(0.3, 0.5, 0.8));
     let load = solve::Load::of_pulls(&model, &plan, &model.pulls(&plan));
     let jointed = solve::Jointed::new(&model, &model.free, &plan).unwrap();
-    let moved = jointed.balance(&load, None).unwrap().moved;
+    let moved = jointed.balance(&load, None).unwrap().motions;
     let stiffness = stiffness(&model);
     let least = energy(&model, &plan, &stiffness, &moved);
     assert!(least < 0.0);
@@ -349,7 +354,7 @@ fn a_plate_that_nothing_holds_back_comes_apart() {
 }
 
 /// Forces that press plate a down in its middle and lift plate b.
-fn twisting(model: &SurfaceModel) -> Vec<Vec3> {
+fn twist(model: &SurfaceModel) -> Vec<Vec3> {
     let push = |(p, part): (&Vec3, &u32)| {
         if *part == 0 {
             Vec3::new(0.2, 0.0, -p.x.abs())
@@ -410,18 +415,18 @@ fn points_move_as_the_stations_that_the_balance_is_of() {
         .filter_map(|m| m.joint.as_mut())
         .for_each(|joint| joint.is_fast = true);
     for model in [held, free] {
-        let forces_n = twisting(&model);
-        let joined = model.joined(&plan).unwrap();
+        let forces_n = twist(&model);
+        let joined = model.join(&plan).unwrap();
         let jointed = solve::Jointed::new(&model, &model.free, &plan).unwrap();
         let balance = jointed.balance(&model.drift(&forces_n).0, None).unwrap();
         let found = moved_at_stations(&model, &joined.moved_mm(&forces_n, None).unwrap());
         let largest = balance
-            .moved
+            .motions
             .concat()
             .iter()
             .fold(0.0, |l: f64, m| l.max(m.abs()));
         let least = parts::least_compliance(&model.params);
-        for ((found, expected), sent) in found.iter().zip(&balance.moved).zip(&balance.sent) {
+        for ((found, expected), sent) in found.iter().zip(&balance.motions).zip(&balance.sent) {
             for i in 0..N_MOTIONS {
                 // Both sides have that compliance.
                 let difference = found[i] + 2.0 * least * sent[i] - expected[i];
@@ -443,9 +448,9 @@ fn forces_that_move_the_whole_as_a_rigid_body_bend_nothing() {
         .zip(&areas_mm2)
         .map(|(p, a)| *a * rigid(p))
         .collect();
-    let joined = model.joined(&plan).unwrap();
-    let largest = |moved: Vec<Vec3>| moved.iter().map(|m| m.length()).fold(0.0, f64::max);
-    let bent = largest(joined.moved_mm(&twisting(&model), None).unwrap());
+    let joined = model.join(&plan).unwrap();
+    let largest = |motions: Vec<Vec3>| motions.iter().map(|m| m.length()).fold(0.0, f64::max);
+    let bent = largest(joined.moved_mm(&twist(&model), None).unwrap());
     let moved = largest(joined.moved_mm(&forces_n, None).unwrap());
     assert!(
         moved < 1e-6 * bent,
@@ -460,8 +465,8 @@ fn how_the_whole_moves_is_left_out_and_twice_the_load_moves_points_twice_as_far(
     plan.iter_mut()
         .filter_map(|m| m.joint.as_mut())
         .for_each(|joint| joint.is_fast = true);
-    let joined = model.joined(&plan).unwrap();
-    let forces_n = twisting(&model);
+    let joined = model.join(&plan).unwrap();
+    let forces_n = twist(&model);
     let twice: Vec<Vec3> = forces_n.iter().map(|f| 2.0 * *f).collect();
     let [once, twice] = [forces_n, twice].map(|f| joined.moved_mm(&f, None).unwrap());
     let areas_mm2 = model.assembly.point_areas_mm2();

@@ -207,7 +207,7 @@ pub(super) fn lines(
 ) -> Vec<Line> {
     let n = (seam.length() / STEP_MM).ceil().max(1.0) as usize;
     let step_mm = seam.length() / n as f64;
-    let normals: Vec<Vec3> = seam.resampled(n).into_iter().map(|s| s.1).collect();
+    let normals: Vec<Vec3> = seam.resample(n).into_iter().map(|s| s.1).collect();
     let points: Vec<Option<Vec3>> = seam
         .below(params.wall_mm, n)
         .into_iter()

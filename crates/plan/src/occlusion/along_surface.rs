@@ -32,7 +32,7 @@ const N_WALKS: f64 = 50_000.0;
 pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tables: &mut [Table; 2]) {
     let lying: Vec<(usize, f64)> = (0..surface.patch_of_face.len())
         .filter_map(|face| {
-            let doubled = surface.mesh.area_vector_doubled(face);
+            let doubled = surface.mesh.double_area_vector(face);
             let area_mm2 = 0.5 * doubled.length();
             let lies_along = area_mm2 > 0.0 && doubled.dot(s).abs() <= ALONG_COS * 2.0 * area_mm2;
             lies_along.then_some((face, area_mm2))

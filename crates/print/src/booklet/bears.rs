@@ -5,7 +5,7 @@ use shellock_render::stills::{Camera, Painted, projection, render};
 
 use super::view::Lookout;
 use super::{
-    ARROW, Color, Drawn, FAINT, Facing, GREY, INK, OTHER_DENSITY, STEPS, WHITE, bold, cell_mm, numbered,
+    ARROW, Color, Drawn, FAINT, Facing, GREY, INK, OTHER_DENSITY, STEPS, WHITE, bold, cell_mm, draw_number,
     small,
 };
 use crate::fonts::Fonts;
@@ -62,7 +62,7 @@ pub(super) fn fill(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>], b
     let Some(weakest) = &borne.weakest else { return };
     down += 1.6 * LINE_MM;
     page.text([left, down], bold(3.8, ARROW), "gives way first");
-    for line in wrapped(page.fonts(), &weakest.words, plain(INK), room_mm) {
+    for line in wrap(page.fonts(), &weakest.words, plain(INK), room_mm) {
         down += LINE_MM;
         page.text_within([left, down], room_mm, plain(INK), &line);
     }
@@ -90,12 +90,12 @@ fn place(
     let direction = lookout.best(weakest.at, &weakest.lines);
     let camera = Camera::along(direction, Vec3::Z);
     let is_parting = |d: &Drawn<'_>| weakest.between.contains(&d.piece.number);
-    let facing: Vec<Facing> = drawn.iter().map(|d| d.facing(direction)).collect();
+    let facing: Vec<Facing> = drawn.iter().map(|d| d.visible_faces(direction)).collect();
     let color = |d: &Drawn<'_>| if is_parting(d) { d.piece.color } else { GREY };
     let scene: Vec<Painted<'_>> = facing
         .iter()
         .zip(drawn)
-        .map(|(f, d)| f.painted(color(d), Vec3::ZERO))
+        .map(|(f, d)| f.paint(color(d), Vec3::ZERO))
         .collect();
     let size = [width_mm, height_mm].map(|mm| (mm.max(1.0) * OTHER_DENSITY) as usize);
     let on_picture = projection(&scene, &camera, size[0], size[1]);
@@ -117,7 +117,7 @@ fn place(
     page.disc(on_page(weakest.at), MARK_MM, ARROW);
     for (i, d) in drawn.iter().filter(|d| is_parting(d)).enumerate() {
         let middle = [left + 5.0 + 11.0 * i as f64, top + height_mm - 5.0];
-        numbered(page, middle, 4.2, d.piece.color, &d.piece.number.to_string());
+        draw_number(page, middle, 4.2, d.piece.color, &d.piece.number.to_string());
     }
 }
 
@@ -148,7 +148,7 @@ pub(super) fn plain(color: Color) -> Style {
 }
 
 /// Breaks a text into lines of whole words no wider than `room_mm`. A single longer word keeps its width.
-pub(super) fn wrapped(fonts: &Fonts<'_>, text: &str, style: Style, room_mm: f64) -> Vec<String> {
+pub(super) fn wrap(fonts: &Fonts<'_>, text: &str, style: Style, room_mm: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
@@ -171,10 +171,10 @@ mod tests {
         let text =
             "where it is pressed as it lies: pins between pieces 7 and 10 bend (in the middle, 37 mm up)";
         let fonts = Fonts::new(&[]);
-        let lines = wrapped(&fonts, text, plain(INK), 50.0);
+        let lines = wrap(&fonts, text, plain(INK), 50.0);
         let fits = |line: &String| width_mm(&fonts, plain(INK), line) <= 50.0;
         assert!(lines.len() > 1 && lines.iter().all(fits));
         assert_eq!(lines.join(" "), text);
-        assert!(wrapped(&fonts, "", plain(INK), 50.0).is_empty());
+        assert!(wrap(&fonts, "", plain(INK), 50.0).is_empty());
     }
 }

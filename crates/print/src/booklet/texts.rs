@@ -1,7 +1,7 @@
 //! Pages of text alone: what to do before the first step and after the last.
 
-use super::bears::{plain, wrapped};
-use super::{INK, RIM_MM, Section, bold, headed};
+use super::bears::{plain, wrap};
+use super::{INK, RIM_MM, Section, bold, start_page};
 use crate::fonts::Fonts;
 use crate::pdf::{PAGE_MM, Page, Style};
 
@@ -20,12 +20,12 @@ pub(super) fn text_pages<'f>(title: &str, sections: &[Section], fonts: &'f Fonts
         let lines: Vec<Vec<String>> = section
             .lines
             .iter()
-            .map(|l| wrapped(fonts, l, style, room_mm))
+            .map(|l| wrap(fonts, l, style, room_mm))
             .collect();
         let n_lines: usize = lines.iter().map(Vec::len).sum();
         let height = LINE_MM * (n_lines as f64 + 0.4 * lines.len() as f64 + 3.0);
         if down + height > bottom_mm {
-            pages.push(headed(title, "", fonts));
+            pages.push(start_page(title, "", fonts));
             down = TOP_MM;
         }
         let Some(page) = pages.last_mut() else { break };

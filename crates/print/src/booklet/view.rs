@@ -39,11 +39,11 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
         .into_par_iter()
         .map(|i| {
             let travel_mm = travel_mm(pieces[i], all.diagonal());
-            let step = Step::new(pieces[i], &trees[..i], travel_mm, all.diagonal());
-            let places = directions.iter().map(|d| step.place_seen(*d)).collect();
+            let step = ViewStep::new(pieces[i], &trees[..i], travel_mm, all.diagonal());
+            let places = directions.iter().map(|d| step.place_visibility(*d)).collect();
             (
                 travel_mm,
-                directions.iter().map(|d| step.seen(*d)).collect(),
+                directions.iter().map(|d| step.score(*d)).collect(),
                 places,
             )
         })
@@ -162,7 +162,7 @@ impl Lookout {
 }
 
 /// One step: sample points of the new piece with their normals, and the earlier pieces that may hide them.
-struct Step<'a> {
+struct ViewStep<'a> {
     points: Vec<(Vec3, Vec3)>,
     along: Vec3,
     travel_mm: f64,
@@ -170,7 +170,7 @@ struct Step<'a> {
     far_mm: f64,
 }
 
-impl<'a> Step<'a> {
+impl<'a> ViewStep<'a> {
     fn new(piece: &ReportPiece<'_>, there: &'a [TriangleBvh], travel_mm: f64, diagonal_mm: f64) -> Self {
         let along = Vec3::from(piece.installation_direction);
         Self {
@@ -184,7 +184,7 @@ impl<'a> Step<'a> {
 
     /// Visible share of the piece's place along `direction`, [0, 1]. Half of a closed surface faces the
     /// viewer and counts as 1.
-    fn place_seen(&self, direction: Vec3) -> f64 {
+    fn place_visibility(&self, direction: Vec3) -> f64 {
         self.share(direction, Vec3::ZERO)
     }
 
@@ -199,7 +199,7 @@ impl<'a> Step<'a> {
     }
 
     /// Score of a direction: visible shares of the piece, of its place and of its path.
-    fn seen(&self, direction: Vec3) -> f64 {
+    fn score(&self, direction: Vec3) -> f64 {
         let back = -self.travel_mm * self.along;
         let sine = self.along.cross(direction).length();
         self.share(direction, back)

@@ -50,7 +50,7 @@ fn a_text_that_is_fitted_is_no_wider_than_its_room_and_short_ones_stay_as_they_a
     let style = style(4.0);
     let long = "the key, from below, behind and its left: it locks all";
     for room_mm in [200.0, 60.0, 30.0, 8.0] {
-        let (fit, text) = fitted(&fonts, style, long, room_mm);
+        let (fit, text) = fit(&fonts, style, long, room_mm);
         assert!(
             width_mm(&fonts, fit, &text) <= room_mm + 1e-6,
             "{text} in {room_mm} mm"
@@ -62,8 +62,8 @@ fn a_text_that_is_fitted_is_no_wider_than_its_room_and_short_ones_stay_as_they_a
             assert!(width_mm(&fonts, fit, &more) > room_mm, "{more} in {room_mm} mm");
         }
     }
-    assert_eq!(fitted(&fonts, style, "done", 60.0).1, "done");
-    assert!(fitted(&fonts, style, long, 8.0).1.ends_with("..."));
+    assert_eq!(fit(&fonts, style, "done", 60.0).1, "done");
+    assert!(fit(&fonts, style, long, 8.0).1.ends_with("..."));
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn no_name_stops_the_program_and_what_no_font_has_becomes_a_box() {
         let bytes = line(name, true, &[]);
         assert_eq!(read(&bytes).len(), 1, "{name:?}");
         let fonts = Fonts::new(&[]);
-        let fit = fitted(&fonts, style(5.0), name, 100.0);
+        let fit = fit(&fonts, style(5.0), name, 100.0);
         assert!(width_mm(&fonts, fit.0, &fit.1) <= 100.0 + 1e-9);
     }
     let runs = Fonts::new(&[]).line("兔", false);

@@ -60,7 +60,7 @@ impl Pose {
     }
 
     /// Returns the pose turned by 90° about the vertical.
-    pub fn quarter_turned(&self) -> Self {
+    pub fn quarter_turn(&self) -> Self {
         let [x, y, z] = self.axes;
         let Aabb { min, max } = self.bounds;
         let bounds = Aabb {
@@ -143,7 +143,7 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
     let all = |directions: Vec<Vec3>, mesh: &TriMesh, cell_mm: f64| -> Vec<Judged> {
         directions
             .into_par_iter()
-            .map(|up| body.judged(printer, up, mesh, cell_mm))
+            .map(|up| body.judge(printer, up, mesh, cell_mm))
             .collect()
     };
     let simple = Volume::from_closed_mesh(piece.mesh).map(|volume| volume.simplify(SIMPLE_MM).to_mesh());
@@ -168,10 +168,10 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
     let judged = fine.into_iter().chain(coarse);
     let unjudged = rest
         .into_iter()
-        .map(|(_, up)| body.judged(printer, up, simple, COARSE_MM));
+        .map(|(_, up)| body.judge(printer, up, simple, COARSE_MM));
     judged
         .chain(unjudged)
-        .find_map(|judged| body.turned(judged.up, judged.load, room_mm))
+        .find_map(|judged| body.best_turn(judged.up, judged.load, room_mm))
 }
 
 /// Sorts stably, so that the first of equally good directions stays first.
@@ -183,7 +183,7 @@ fn cheapest_first(judged: &mut [Judged]) {
 pub(super) fn fits(piece: &Printable<'_>, room_mm: [f64; 3]) -> bool {
     Body::of(piece).is_some_and(|body| {
         let mut directions = body.directions().into_iter();
-        directions.any(|up| body.turned(up, Load::default(), room_mm).is_some())
+        directions.any(|up| body.best_turn(up, Load::default(), room_mm).is_some())
     })
 }
 
@@ -285,7 +285,7 @@ impl Body {
     }
 
     /// Judges the cost of a direction, with cells of `cell_mm`.
-    fn judged(&self, printer: &Printer, up: Vec3, mesh: &TriMesh, cell_mm: f64) -> Judged {
+    fn judge(&self, printer: &Printer, up: Vec3, mesh: &TriMesh, cell_mm: f64) -> Judged {
         let prices = prices(printer.process);
         let (x, y) = up.any_orthonormal_pair();
         let columns = Columns::of(mesh, [x, y, up], cell_mm);
@@ -349,7 +349,7 @@ impl Body {
     }
 
     /// Returns the turn about `up` with the smallest footprint that fits into `room_mm`, if any.
-    fn turned(&self, up: Vec3, load: Load, room_mm: [f64; 3]) -> Option<Pose> {
+    fn best_turn(&self, up: Vec3, load: Load, room_mm: [f64; 3]) -> Option<Pose> {
         let (x, y) = up.any_orthonormal_pair();
         let support = self.support(up);
         let poses = (0..N_YAWS).map(|i| {

@@ -119,7 +119,7 @@ fn without(free: &[Rect], taken: &Rect) -> Vec<Rect> {
 mod tests {
     use super::*;
 
-    fn taken(sides: [f64; 2], spot: &Spot) -> Rect {
+    fn occupy(sides: [f64; 2], spot: &Spot) -> Rect {
         let [a, b] = if spot.is_turned {
             [sides[1], sides[0]]
         } else {
@@ -138,7 +138,7 @@ mod tests {
             .collect();
         let spots = pack([100.0, 90.0], &sides);
         for (i, spot) in spots.iter().enumerate() {
-            let mine = taken(sides[i], spot);
+            let mine = occupy(sides[i], spot);
             assert!(
                 Rect {
                     min: [0.0; 2],
@@ -149,7 +149,7 @@ mod tests {
             );
             for (j, other) in spots.iter().enumerate().take(i) {
                 assert!(
-                    spot.plate != other.plate || !mine.overlaps(&taken(sides[j], other)),
+                    spot.plate != other.plate || !mine.overlaps(&occupy(sides[j], other)),
                     "{i} and {j}"
                 );
             }

@@ -30,7 +30,7 @@ fn a_bowl_lies_with_no_support_on_its_skin() {
     let mesh = bowl();
     for printer in [Printer::sla(), Printer::fdm()] {
         let plates = lay(&printer, &[printable(&mesh, |p| p.length() > 19.0)]);
-        let laid = plates.laid[0];
+        let laid = plates.poses[0];
         assert_eq!(laid.outer_support_mm2, 0.0, "{}", printer.name);
         assert!(laid.support_mm2 > 0.0, "its inner side hangs over");
     }
@@ -51,24 +51,24 @@ fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
         ..Printer::fdm()
     };
     let plates = lay(&printer, &pieces);
-    assert_eq!((plates.laid.len(), plates.too_large.len()), (8, 0));
+    assert_eq!((plates.poses.len(), plates.too_large.len()), (8, 0));
     let boxes: Vec<Aabb> = plates
-        .laid
+        .poses
         .iter()
         .map(|l| on_plate(l, pieces[l.piece].mesh))
         .collect();
-    for (i, (laid, mine)) in plates.laid.iter().zip(&boxes).enumerate() {
+    for (i, (laid, mine)) in plates.poses.iter().zip(&boxes).enumerate() {
         assert!(
             mine.min.z.abs() < 1e-9 && mine.min.x > 3.9 && mine.max.x < 96.1 && mine.max.y < 76.1,
             "{mine:?}"
         );
         assert!((mine.size() - Vec3::from_array(laid.size_mm)).length() < 1e-9);
-        let [x, y, z] = laid.turned.map(Vec3::from_array);
+        let [x, y, z] = laid.axes.map(Vec3::from_array);
         assert!(
             (x.cross(y) - z).length() < 1e-12 && x.dot(y).abs() < 1e-12,
             "turned, not mirrored"
         );
-        for (other, theirs) in plates.laid.iter().zip(&boxes).take(i) {
+        for (other, theirs) in plates.poses.iter().zip(&boxes).take(i) {
             assert!(
                 laid.plate != other.plate || !mine.grown(2.9).intersects(*theirs),
                 "pieces {i} and {}",
@@ -88,7 +88,7 @@ fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
         &[printable(&rod, |_| false), printable(&long, |_| false)],
     );
     assert_eq!(
-        (plates.too_large, plates.laid.len(), plates.n_plates),
+        (plates.too_large, plates.poses.len(), plates.n_plates),
         (vec![1], 1, 1)
     );
     assert!(fits_whole(
@@ -130,8 +130,8 @@ fn swaps_make_plates_no_worse_and_lose_no_piece() {
             .enumerate()
             .collect();
         let order: Vec<usize> = (0..poses.len()).collect();
-        let before = packed(&printer, &poses, &order).cost(&poses);
-        let after = improved(&printer, &poses, order.clone());
+        let before = pack_in_order(&printer, &poses, &order).cost(&poses);
+        let after = improve(&printer, &poses, order.clone());
         assert!(after.cost(&poses) <= before);
         n_better += usize::from(after.cost(&poses) < before);
         let mut packed: Vec<usize> = after.0.iter().map(|(at, _)| *at).collect();

@@ -129,7 +129,7 @@ pub fn is_over(assembly: &ShellAssembly, feet: &[u32], up: Vec3, p: Vec3) -> boo
 /// until its `center` is above the face it rests on. `None` if the hull is empty or not closed.
 pub fn at_rest(hull: &TriMesh, center: Vec3, up: Vec3) -> Option<Vec3> {
     let topology = Topology::of_mesh(hull)?;
-    let normal = |face: usize| hull.area_vector_doubled(face).normalize_or_zero();
+    let normal = |face: usize| hull.double_area_vector(face).normalize_or_zero();
     let lowest = |a: &usize, b: &usize| normal(*a).dot(up).total_cmp(&normal(*b).dot(up));
     let mut face = (0..hull.triangles.len()).min_by(lowest)?;
     // Each step lowers the centre, so no face comes twice.
@@ -164,7 +164,7 @@ pub fn widths(assembly: &ShellAssembly, mesh: &TriMesh, surface: &TriangleBvh) -
     let width = |i: usize| {
         let (p, n) = (assembly.points[i], assembly.normals[i]);
         let (face, width_mm) = surface.first_hit(p - BELOW_MM * n, -n, f64::INFINITY)?;
-        let opposite = mesh.area_vector_doubled(face as usize).normalize_or_zero().dot(n) <= OPPOSITE;
+        let opposite = mesh.double_area_vector(face as usize).normalize_or_zero().dot(n) <= OPPOSITE;
         let hit = p - width_mm * n;
         let corners = mesh.triangles[face as usize].map(|v| v as usize);
         let end = corners.into_iter().min_by(|a, b| {

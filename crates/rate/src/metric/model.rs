@@ -409,7 +409,7 @@ fn relaxed(mut mesh: TriMesh) -> TriMesh {
     for _ in 0..MOST_ROUNDS {
         let normals = point_normals(&mesh);
         let is_folded = |face: &usize| {
-            let across = mesh.area_vector_doubled(*face).normalize_or_zero();
+            let across = mesh.double_area_vector(*face).normalize_or_zero();
             mesh.triangles[*face]
                 .iter()
                 .any(|&v| normals[v as usize].dot(across) < LEAST_COSINE)
@@ -457,7 +457,7 @@ fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; mesh.points.len()];
     let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.points.len()];
     for (face, t) in mesh.triangles.iter().enumerate() {
-        let area_vector = mesh.area_vector_doubled(face);
+        let area_vector = mesh.double_area_vector(face);
         for &v in t {
             normals[v as usize] += area_vector;
             around[v as usize].extend(area_vector.try_normalize());

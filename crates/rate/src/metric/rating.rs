@@ -116,7 +116,7 @@ impl<'a> Bench<'a> {
     /// Least load factor of a plan in use, which is its score.
     pub fn least_use(&self, plan: &LatticePlan) -> Result<f64, SparseError> {
         let meetings = self.model.meetings(plan);
-        let joined = self.surface.joined(&meetings)?;
+        let joined = self.surface.join(&meetings)?;
         let uses = self
             .drifts
             .iter()
@@ -145,7 +145,7 @@ impl<'a> Bench<'a> {
         from: Option<&Rated<'b>>,
     ) -> Result<Rated<'b>, SparseError> {
         let meetings = self.model.meetings(&ranked.plan);
-        let joined = from.map_or_else(|| self.surface.joined(&meetings), |f| f.joined.changed(&meetings))?;
+        let joined = from.map_or_else(|| self.surface.join(&meetings), |f| f.joined.rejoin(&meetings))?;
         Ok(Rated {
             ranked,
             meetings,
@@ -205,7 +205,7 @@ impl<'b> Rated<'b> {
                 (borne(meetings, &bearing, bench.strength_mpa), closed)
             }
             None => {
-                let (opening, closed) = self.joined.pulled(meetings, start)?;
+                let (opening, closed) = self.joined.pull(meetings, start)?;
                 (Borne::of_pull(&opening), closed)
             }
         };

@@ -122,12 +122,7 @@ fn with_no_part_held_the_pull_opens_seams_no_less_than_with_one_that_is_held_and
     let Resistance::Holds(held) = solver.resist(&meetings, 7).unwrap().resistance else {
         panic!("it holds")
     };
-    let free = solver
-        .joined(&meetings)
-        .unwrap()
-        .pulled(&meetings, None)
-        .unwrap()
-        .0;
+    let free = solver.join(&meetings).unwrap().pull(&meetings, None).unwrap().0;
     let ratio = free.quality_mm / held.quality_mm;
     assert!((0.999..2.0).contains(&ratio), "{ratio}");
 }

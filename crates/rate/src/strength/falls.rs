@@ -201,7 +201,7 @@ fn fall(mesh: &TriMesh, areas_mm2: &[f64], down: Vec3, total_n: f64) -> LoadCase
     LoadCase {
         forces_n,
         moments_n_mm: Vec::new(),
-        held: zone(mesh, areas_mm2, -down),
+        anchors: zone(mesh, areas_mm2, -down),
     }
 }
 

@@ -78,7 +78,7 @@ fn the_force_of_a_fall_stops_all_of_the_shell_and_acts_at_the_bottom_alone() {
         assert!((total + *down * force_n_mm3).length() < 1e-12 * force_n_mm3.max(1.0));
         let height = |v: usize| falls.mesh.points[v].dot(*down);
         let pushed = (0..case.forces_n.len()).filter(|v| case.forces_n[*v] != Vec3::ZERO);
-        let held = case.held.iter().map(|v| height(*v as usize));
+        let held = case.anchors.iter().map(|v| height(*v as usize));
         assert!(pushed.map(height).fold(f64::INFINITY, f64::min) > held.fold(f64::NEG_INFINITY, f64::max));
     }
 }

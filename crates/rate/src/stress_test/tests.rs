@@ -119,7 +119,7 @@ fn what_is_tested_is_what_is_printed() {
 
 #[test]
 fn the_directions_of_a_turned_model_are_those_of_the_lattice_again() {
-    let turn = Turn::laying(Vec3::new(0.48, 0.6, 0.64), Vec3::new(0.8, 0.0, -0.6)).0;
+    let turn = Turn::align(Vec3::new(0.48, 0.6, 0.64), Vec3::new(0.8, 0.0, -0.6)).0;
     let params = StressParams { turn, ..coarse() };
     let ways = outwards().steps.into_iter().map(|s| {
         let way = turn.inverse().apply(s.separation.unit());

@@ -20,7 +20,7 @@ pub fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let (first, faces) = faces_around_points(mesh);
     let doubled: Vec<Vec3> = (0..mesh.triangles.len())
         .into_par_iter()
-        .map(|f| mesh.area_vector_doubled(f))
+        .map(|f| mesh.double_area_vector(f))
         .collect();
     let units: Vec<Vec3> = doubled.par_iter().map(|n| n.normalize_or_zero()).collect();
     (0..mesh.triangles.len())

@@ -50,7 +50,7 @@ impl<'a> Candidate<'a> {
         let Some(site) = place else {
             return Some(as_it_lies);
         };
-        let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
+        let (turn, along) = Turn::align(site.prism.normal, site.prism.slide);
         let key = Some(CutKey {
             site: site.rotate(&turn, along),
             along,

@@ -83,12 +83,12 @@ impl Kit {
 
     /// Returns true if the kit passed its verification and no piece rattles.
     pub fn is_firm(&self) -> bool {
-        self.verification.passed() && self.rattles.is_empty()
+        self.verification.has_passed() && self.rattles.is_empty()
     }
 
     /// Returns true if the time was over before ways out were sought that a proof does not rule out.
     pub(super) fn is_hurried(&self) -> bool {
-        self.verification.passed() && self.play.ways_out.is_none()
+        self.verification.has_passed() && self.play.ways_out.is_none()
     }
 
     /// Returns true if rattling is the only fault: a piece rattles, and either no check fails, or one fails
@@ -268,7 +268,7 @@ fn judged(
     let size_mm = model.mesh().bounds().size().max_element();
     let rattles = play::rattles(&measured, &finished.meshes, size_mm, settings.verify.clearance_mm);
     verification.add(play::check(&measured, &rattles));
-    if verification.passed() {
+    if verification.has_passed() {
         // The search for ways out is slow, so kits that already fail are not searched.
         let clearance_mm = settings.verify.clearance_mm;
         match play::look_for_ways_out(ctx, clearance_mm, &finished.meshes, &mut measured) {

@@ -435,7 +435,7 @@ fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
 impl PrintedFit {
     fn of(ctx: &Ctx, kit: &Kit, gaps: &KitGaps) -> Result<Self, Cancelled> {
         let within_mm = fits_within_mm(kit, gaps);
-        let tried_mm = within_mm.filter(|mm| *mm > 0.0 && kit.verification.passed());
+        let tried_mm = within_mm.filter(|mm| *mm > 0.0 && kit.verification.has_passed());
         let loosest = tried_mm.map(|mm| {
             let plays = play::printed_thin(ctx, &kit.pieces, &kit.play, mm)?;
             let plays = plays

@@ -88,7 +88,7 @@ fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
 
 #[test]
 fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches() {
-    let turn = Turn::laying(Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)).0;
+    let turn = Turn::align(Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)).0;
     let handover = Handover::new(&turn, found_plan([2, 0, 1]));
     let told = handover.warnings(vec![Warning::new(
         crate::causes::Design::SeamWithoutConnector { length_mm: 9.0 },

@@ -152,14 +152,14 @@ impl<'a> Scale<'a> {
     /// Opening of a plan's weakest seam under the even force, −Q, mm.
     fn opening_mm(&self, plan: &LatticePlan) -> Result<f64, SparseError> {
         let meetings = self.subject.model.meetings(plan);
-        let (opening, _) = self.surface.joined(&meetings)?.pulled(&meetings, None)?;
+        let (opening, _) = self.surface.join(&meetings)?.pull(&meetings, None)?;
         Ok(-opening.quality_mm)
     }
 
     /// Least load factor of uses; `None` if it is below `floor`.
     fn least(&self, plan: &LatticePlan, floor: f64) -> Result<Option<f64>, SparseError> {
         let meetings = self.subject.model.meetings(plan);
-        let joined = self.surface.joined(&meetings)?;
+        let joined = self.surface.join(&meetings)?;
         let mut least = f64::INFINITY;
         for load in &self.uses {
             let (bearing, _) = joined.bear(&meetings, load, None)?;

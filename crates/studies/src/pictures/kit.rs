@@ -77,7 +77,7 @@ impl Kit {
         let model = figure::make(Figure::Squirrel, SIZE_MM, SIZE_MM / CELLS);
         let outcome = with_ctx(|ctx| design(ctx, params, &model, None)).map_err(|e| fault(e.to_string()))?;
         let design = match outcome {
-            DesignOutcome::Made(design) if design.kit.verification.passed() => *design,
+            DesignOutcome::Made(design) if design.kit.verification.has_passed() => *design,
             DesignOutcome::Made(_) => return Err(fault("its kit fails a check".into())),
             DesignOutcome::NoPlan { reason, .. } => return Err(fault(reason)),
         };

@@ -138,7 +138,7 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let (mut plan, mut turn) = (kit.settings.plan.clone(), Turn::default());
     if let Some(site) = &kit.design.key {
         plan.key = Some(made.plan.key());
-        let (laid, along) = Turn::laying(site.prism.normal, site.prism.slide);
+        let (laid, along) = Turn::align(site.prism.normal, site.prism.slide);
         (turn, plan.key_slide) = (laid, Some(along));
     }
     let params = StressParams {

@@ -34,7 +34,7 @@ pub fn plates(kit: &Kit) -> Vec<u8> {
     for printer in [Printer::fdm(), Printer::sla()] {
         let plates = lay(&printer, &printables);
         for plate in 0..plates.n_plates {
-            let on_plate: Vec<_> = plates.laid.iter().filter(|l| l.plate == plate).collect();
+            let on_plate: Vec<_> = plates.poses.iter().filter(|l| l.plate == plate).collect();
             let laid: Vec<(TriMesh, [u8; 3])> = on_plate
                 .iter()
                 .map(|l| {
@@ -113,7 +113,7 @@ pub fn booklet(kit: &Kit) -> Vec<u8> {
         let left = at[0] + if i + 1 < 10 { 56.0 } else { 76.0 };
         sheet.numbered([left, at[1] + 28.0], step.piece.0, step.piece.1);
         sheet.words([left + 24.0, at[1] + 24.0], &step.heading);
-        let (words, is_new) = step.seen;
+        let (words, is_new) = step.viewpoint;
         let style = if is_new {
             "fill=\"#ce2c1e\" font-weight=\"bold\" font-size=\"13\""
         } else {

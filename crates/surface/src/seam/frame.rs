@@ -32,11 +32,11 @@ impl FramedLine {
         if length_mm < SHORTEST_MM {
             return None;
         }
-        let (at, points): (Vec<f64>, Vec<Vec3>) = resampled(polyline, STEP_MM).into_iter().unzip();
-        let points = smoothed(points, is_loop, SMOOTHING_ROUNDS);
+        let (at, points): (Vec<f64>, Vec<Vec3>) = resample(polyline, STEP_MM).into_iter().unzip();
+        let points = smooth(points, is_loop, SMOOTHING_ROUNDS);
         let tangents = tangents(&points, is_loop);
         let raw: Vec<Vec3> = at.iter().zip(&points).map(|(&at, &p)| outward(at, p)).collect();
-        let normals: Vec<Vec3> = smoothed(raw, is_loop, SMOOTHING_ROUNDS)
+        let normals: Vec<Vec3> = smooth(raw, is_loop, SMOOTHING_ROUNDS)
             .into_iter()
             .zip(&tangents)
             .map(|(n, u)| (n - n.dot(*u) * *u).normalize_or_zero())
@@ -90,7 +90,7 @@ pub fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -> Vec<b
 
 /// Resamples the polyline at equal distances of about `step_mm`, ends kept: the position, counted in vertices
 /// of the polyline, and the point.
-fn resampled(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
+fn resample(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
     let mut at = vec![0.0];
     for w in line.windows(2) {
         at.push(at[at.len() - 1] + w[0].distance(w[1]));
@@ -116,7 +116,7 @@ fn resampled(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
 }
 
 /// Averages repeatedly by ¼ ½ ¼ along a line; ends stay, a loop's first and last value stay equal.
-fn smoothed(mut values: Vec<Vec3>, is_loop: bool, rounds: usize) -> Vec<Vec3> {
+fn smooth(mut values: Vec<Vec3>, is_loop: bool, rounds: usize) -> Vec<Vec3> {
     let n = values.len();
     for _ in 0..rounds {
         let old = values.clone();
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn resampling_keeps_ends_and_spacing() {
         let line = [Vec3::ZERO, Vec3::X, 1.3 * Vec3::X, Vec3::new(1.3, 5.0, 0.0)];
-        let (at, points): (Vec<f64>, Vec<Vec3>) = resampled(&line, 1.0).into_iter().unzip();
+        let (at, points): (Vec<f64>, Vec<Vec3>) = resample(&line, 1.0).into_iter().unzip();
         assert_eq!((at[0], at[at.len() - 1]), (0.0, 3.0));
         assert_eq!((points[0], points[points.len() - 1]), (line[0], line[3]));
         let arcs: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();

@@ -84,12 +84,12 @@ impl ContactGraph {
 
     /// Connected components, each sorted by id, in order of their lowest id.
     pub fn parts(&self) -> Vec<Vec<PatchId>> {
-        self.parts_avoiding(None)
+        self.components_without(None)
     }
 
     /// Connected components of the rest without `patch`, in order of their lowest id.
     pub fn parts_without(&self, patch: PatchId) -> Vec<Vec<PatchId>> {
-        self.parts_avoiding(Some(patch))
+        self.components_without(Some(patch))
     }
 
     /// Pieces without which the rest falls into more components, sorted by id.
@@ -116,7 +116,7 @@ impl ContactGraph {
         3 * self.parts().len().saturating_sub(1) + hanging.sum::<usize>()
     }
 
-    fn parts_avoiding(&self, without: Option<PatchId>) -> Vec<Vec<PatchId>> {
+    fn components_without(&self, without: Option<PatchId>) -> Vec<Vec<PatchId>> {
         let mut part: Vec<usize> = (0..self.n_patches).collect();
         fn root(part: &mut [usize], mut i: usize) -> usize {
             while part[i] != i {

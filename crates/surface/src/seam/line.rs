@@ -95,7 +95,7 @@ impl SegmentedSurface {
         let labels: Vec<u32> = self.patch_of_face.iter().map(|p| p.0).collect();
         let mut normals = vec![Vec3::ZERO; self.mesh.points.len()];
         for (face, t) in self.mesh.triangles.iter().enumerate() {
-            let area_vector = self.mesh.area_vector_doubled(face);
+            let area_vector = self.mesh.double_area_vector(face);
             t.iter().for_each(|&v| normals[v as usize] += area_vector);
         }
         let seam = seam_half_edges(&topology, &labels, 0..labels.len() as u32);

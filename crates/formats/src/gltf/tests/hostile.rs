@@ -77,7 +77,7 @@ fn a_sparse_accessor_reserves_only_what_triangles_use() {
     let mut file = File::tetrahedron();
     let points = file.sparse(None, 1 << 60, &[1, 2, 3], &POINTS[1..]);
     file.attributes()["POSITION"] = json!(points);
-    assert_close(&file.points(), &moved(|p| p));
+    assert_close(&file.points(), &transform(|p| p));
     file.json["accessors"][points]["sparse"]["count"] = json!(1_u64 << 60);
     assert!(file.message().contains("beyond its data"), "{}", file.message());
     file.json["accessors"][points]["count"] = json!(3);

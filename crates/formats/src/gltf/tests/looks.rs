@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::LabelSource;
-use crate::tests::assert_told;
+use crate::tests::assert_note;
 
 #[test]
 fn colours_of_points_divide_by_most_corners() {
@@ -54,7 +54,7 @@ fn colours_that_cannot_be_read_are_noted_and_the_shape_is_read() {
     let few = file.shares(&[[255, 0, 0]; 3]);
     file.attributes()["COLOR_0"] = json!(few);
     let loaded = file.read().unwrap();
-    assert_told(&loaded, "colours of points cannot be read");
+    assert_note(&loaded, "colours of points cannot be read");
     assert_eq!(loaded.mesh, File::tetrahedron().read().unwrap().mesh);
 }
 
@@ -96,7 +96,7 @@ fn each_thing_left_out_is_noted_once() {
         "texture",
         "variants",
     ];
-    noted.iter().for_each(|words| assert_told(&loaded, words));
+    noted.iter().for_each(|words| assert_note(&loaded, words));
     assert_eq!(loaded.notes.len(), 1 + noted.len(), "{:?}", loaded.notes);
 }
 
@@ -114,7 +114,7 @@ fn hidden_nodes_and_those_below_are_left_out() {
     file.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
     let loaded = file.read().unwrap();
     assert_eq!(loaded.mesh, File::tetrahedron().read().unwrap().mesh);
-    assert_told(&loaded, "1 hidden mesh is left out");
+    assert_note(&loaded, "1 hidden mesh is left out");
 }
 
 #[test]

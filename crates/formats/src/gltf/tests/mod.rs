@@ -168,7 +168,7 @@ fn glb(json: &[u8], data: &[u8]) -> Vec<u8> {
 }
 
 /// Points of the tetrahedron, each moved by `f`.
-fn moved(f: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
+fn transform(f: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
     POINTS.map(|p| f(Vec3::from_array(p.map(f64::from)))).to_vec()
 }
 

@@ -8,7 +8,7 @@ use crate::LabelSource;
 /// A quarter turn about z.
 const QUARTER: [f32; 4] = [0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2];
 
-fn turned(p: Vec3) -> Vec3 {
+fn turn(p: Vec3) -> Vec3 {
     Vec3::new(-p.y, p.x, p.z)
 }
 
@@ -34,7 +34,7 @@ fn bound() -> File {
 
 #[test]
 fn joints_at_rest_leave_the_mesh_as_it_was_bound() {
-    assert_close(&bound().points(), &moved(|p| p));
+    assert_close(&bound().points(), &transform(|p| p));
 }
 
 #[test]
@@ -60,13 +60,13 @@ fn points_follow_their_joints_and_those_above() {
     // Both joints turn about the first.
     let about = |p: Vec3| {
         let center = Vec3::new(1.0, 2.0, 3.0);
-        center + turned(p - center)
+        center + turn(p - center)
     };
-    assert_close(&file.points(), &moved(about));
+    assert_close(&file.points(), &transform(about));
     // Joints need not be in the scene, and their scale counts.
     let mut file = File::tetrahedron();
     file.skin(&[json!({ "scale": [2, 3, 4] })]);
-    assert_close(&file.points(), &moved(|p| p * Vec3::new(2.0, 3.0, 4.0)));
+    assert_close(&file.points(), &transform(|p| p * Vec3::new(2.0, 3.0, 4.0)));
 }
 
 #[test]
@@ -82,7 +82,10 @@ fn weights_share_a_point_among_joints_and_need_not_add_up_to_1() {
         let weights = file.floats(&[weights; 4]);
         file.attributes()["JOINTS_0"] = json!(joints);
         file.attributes()["WEIGHTS_0"] = json!(weights);
-        assert_close(&file.points(), &moved(|p| p + Vec3::new(4.0 * share, 0.0, 0.0)));
+        assert_close(
+            &file.points(),
+            &transform(|p| p + Vec3::new(4.0 * share, 0.0, 0.0)),
+        );
     }
 }
 
@@ -105,7 +108,7 @@ fn a_second_set_of_joints_and_weights_of_bytes_count_too() {
         file.attributes()[name] = json!(which);
     }
     // Joint 7 does not exist, but no weight refers to it.
-    assert_close(&file.points(), &moved(|p| p + Vec3::new(1.0, 0.0, 0.0)));
+    assert_close(&file.points(), &transform(|p| p + Vec3::new(1.0, 0.0, 0.0)));
 }
 
 #[test]
@@ -125,17 +128,17 @@ fn a_morph_target_of_weight_1_adds_its_differences() {
     let primitive = &mut file.json["meshes"][0]["primitives"][0];
     primitive["targets"] = json!([{ "POSITION": target }, { "POSITION": other }, { "NORMAL": 99 }]);
     // Missing weights are all 0.
-    assert_close(&file.points(), &moved(|p| p));
+    assert_close(&file.points(), &transform(|p| p));
     file.json["meshes"][0]["weights"] = json!([1, 0]);
-    assert_close(&file.points(), &moved(|p| p + delta));
+    assert_close(&file.points(), &transform(|p| p + delta));
     // Weights of a node override those of the mesh, and other nodes with the mesh keep its own.
     push(
         &mut file.json["nodes"],
         json!({ "mesh": 0, "weights": [-0.5, 0, 1] }),
     );
     file.json["scenes"][0]["nodes"] = json!([0, 1]);
-    assert_close(&file.points()[4..], &moved(|p| p - 0.5 * delta));
-    assert_close(&file.points()[..4], &moved(|p| p + delta));
+    assert_close(&file.points()[4..], &transform(|p| p - 0.5 * delta));
+    assert_close(&file.points()[..4], &transform(|p| p + delta));
 }
 
 #[test]
@@ -145,7 +148,7 @@ fn morph_targets_come_before_skins() {
     let target = file.floats(&[[1.0, 0.0, 0.0]; 4]);
     file.json["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": target }]);
     file.json["meshes"][0]["weights"] = json!([1]);
-    assert_close(&file.points(), &moved(|p| 2.0 * turned(p + Vec3::X)));
+    assert_close(&file.points(), &transform(|p| 2.0 * turn(p + Vec3::X)));
 }
 
 #[test]
@@ -159,9 +162,9 @@ fn instances_are_copies_with_moves_of_their_own() {
     file.json["nodes"][0]["scale"] = json!([2, 2, 2]);
     let loaded = file.read().unwrap();
     let copies: Vec<Vec3> = [
-        moved(|p| 2.0 * p),
-        moved(|p| 2.0 * (turned(p) + 3.0 * Vec3::X)),
-        moved(|p| 2.0 * (turned(2.0 * p * Vec3::new(-1.0, 1.0, 1.0)) + 8.0 * Vec3::Z)),
+        transform(|p| 2.0 * p),
+        transform(|p| 2.0 * (turn(p) + 3.0 * Vec3::X)),
+        transform(|p| 2.0 * (turn(2.0 * p * Vec3::new(-1.0, 1.0, 1.0)) + 8.0 * Vec3::Z)),
     ]
     .concat();
     assert_close(&loaded.mesh.points, &copies);
@@ -190,7 +193,7 @@ fn instances_do_not_move_the_children_of_their_node() {
     push(&mut file.json["nodes"], json!({ "mesh": 0 }));
     let points = file.points();
     assert_eq!(points.len(), 12);
-    assert_close(&points[8..], &moved(|p| p));
+    assert_close(&points[8..], &transform(|p| p));
 }
 
 #[test]
@@ -215,7 +218,7 @@ fn sparse_data_without_a_base_is_zero_elsewhere() {
     let mut file = File::tetrahedron();
     let position = file.sparse(None, 4, &[1, 2, 3], &POINTS[1..]);
     file.attributes()["POSITION"] = json!(position);
-    assert_close(&file.points(), &moved(|p| p));
+    assert_close(&file.points(), &transform(|p| p));
     // Morph targets are sparse most often.
     let target = file.sparse(None, 4, &[2], &[[0.0, 4.0, 0.0]]);
     let nothing = push(
@@ -225,7 +228,7 @@ fn sparse_data_without_a_base_is_zero_elsewhere() {
     let targets = json!([{ "POSITION": target }, { "POSITION": nothing }]);
     file.json["meshes"][0]["primitives"][0]["targets"] = targets;
     file.json["meshes"][0]["weights"] = json!([1, 1]);
-    assert_close(&file.points(), &moved(|p| p * Vec3::new(1.0, 5.0, 1.0)));
+    assert_close(&file.points(), &transform(|p| p * Vec3::new(1.0, 5.0, 1.0)));
 }
 
 #[test]
@@ -235,7 +238,7 @@ fn quantised_points_are_whole_numbers_or_shares() {
     let whole = file.add("VEC3", U8, 4, &rows);
     file.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
     file.attributes()["POSITION"] = json!(whole);
-    assert_close(&file.points(), &moved(|p| 100.0 * p));
+    assert_close(&file.points(), &transform(|p| 100.0 * p));
     file.json["accessors"][whole]["normalized"] = json!(true);
-    assert_close(&file.points(), &moved(|p| 100.0 / 255.0 * p));
+    assert_close(&file.points(), &transform(|p| 100.0 / 255.0 * p));
 }

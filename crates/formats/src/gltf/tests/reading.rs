@@ -33,7 +33,7 @@ fn json(nodes: &str, buffer: &str) -> String {
     )
 }
 
-fn embedded(nodes: &str) -> String {
+fn embed(nodes: &str) -> String {
     let text = base64::engine::general_purpose::STANDARD.encode(data());
     json(
         nodes,
@@ -60,7 +60,7 @@ const NESTED: &str = r#"[{ "children": [1, 2], "scale": [2, 2, 2] }, { "mesh": 0
 
 #[test]
 fn nodes_move_their_meshes_and_mirrors_keep_the_inside_inside() {
-    let text = read_mesh(embedded(NESTED).as_bytes(), None).unwrap();
+    let text = read_mesh(embed(NESTED).as_bytes(), None).unwrap();
     assert_eq!((text.mesh.triangles.len(), text.unit_mm), (8, Some(1000.0)));
     assert_eq!(text.mesh.points[1], Vec3::new(12.0, 0.0, 0.0));
     assert_eq!(text.mesh.points[5], Vec3::new(-2.0, 0.0, 0.0));
@@ -75,7 +75,7 @@ fn strips_and_fans_are_triangles_too() {
     // Corners 0 2 1 0 1 3 …: in a strip, every other triangle is turned.
     for (mode, second) in [(5, [1, 2, 0]), (6, [0, 1, 0])] {
         let text =
-            embedded(r#"[{ "mesh": 0 }]"#).replace(r#""indices""#, &format!(r#""mode": {mode}, "indices""#));
+            embed(r#"[{ "mesh": 0 }]"#).replace(r#""indices""#, &format!(r#""mode": {mode}, "indices""#));
         let mesh = read_mesh(text.as_bytes(), None).unwrap().mesh;
         assert_eq!(
             (mesh.triangles.len(), mesh.triangles[0], mesh.triangles[1]),
@@ -86,7 +86,7 @@ fn strips_and_fans_are_triangles_too() {
 
 #[test]
 fn what_is_missing_too_long_or_cyclic_is_refused() {
-    let plain = embedded(r#"[{ "mesh": 0 }]"#);
+    let plain = embed(r#"[{ "mesh": 0 }]"#);
     let refused = |from: &str, to: &str| {
         read_mesh(plain.replace(from, to).as_bytes(), None)
             .expect_err("it is broken")
@@ -126,7 +126,7 @@ fn addresses_of_data_come_in_many_spellings() {
     let unpadded = padded.trim_end_matches('=');
     let escaped = unpadded.replace('A', "%41");
     let percents: String = data().iter().map(|byte| format!("%{byte:02x}")).collect();
-    let expected = read_mesh(embedded(NESTED).as_bytes(), None).unwrap();
+    let expected = read_mesh(embed(NESTED).as_bytes(), None).unwrap();
     assert_ne!(padded, unpadded);
     for uri in [
         format!("data:application/gltf-buffer;base64,{padded}"),
@@ -144,9 +144,9 @@ fn addresses_of_data_come_in_many_spellings() {
 
 #[test]
 fn a_buffer_that_no_triangle_uses_may_lie_elsewhere() {
-    let plain = embedded(NESTED);
+    let plain = embed(NESTED);
     let text =
         plain.strip_suffix("] }").unwrap().to_owned() + r#", { "uri": "animation.bin" }, { "uri": "é" }] }"#;
-    let expected = read_mesh(embedded(NESTED).as_bytes(), None).unwrap();
+    let expected = read_mesh(embed(NESTED).as_bytes(), None).unwrap();
     assert_eq!(read_mesh(text.as_bytes(), None).as_ref(), Ok(&expected));
 }

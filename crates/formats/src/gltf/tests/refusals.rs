@@ -37,7 +37,7 @@ fn a_required_extension_that_changes_no_triangle_is_none_to_refuse() {
 }
 
 #[track_caller]
-fn assert_compressed(file: &File, name: &str) {
+fn assert_compression(file: &File, name: &str) {
     let message = file.message();
     for words in ["compressed", name, "export it without compression"] {
         assert!(message.contains(words), "{words:?} is not in {message:?}");
@@ -47,7 +47,7 @@ fn assert_compressed(file: &File, name: &str) {
 #[test]
 fn data_that_is_only_compressed_is_refused_as_such() {
     const DRACO: &str = "KHR_draco_mesh_compression";
-    assert_compressed(&with_extension("extensionsRequired", DRACO), DRACO);
+    assert_compression(&with_extension("extensionsRequired", DRACO), DRACO);
     let mut file = with_extension("extensionsUsed", DRACO);
     let packed = json!({ DRACO: { "bufferView": 0, "attributes": { "POSITION": 0 } } });
     file.json["meshes"][0]["primitives"][0]["extensions"] = packed;
@@ -62,7 +62,7 @@ fn data_that_is_only_compressed_is_refused_as_such() {
             .as_object_mut()
             .unwrap()
             .remove("bufferView");
-        assert_compressed(&file, DRACO);
+        assert_compression(&file, DRACO);
     }
 }
 
@@ -78,7 +78,7 @@ fn a_fallback_buffer_without_data_is_refused_as_compressed() {
         );
         push(&mut file.json["buffers"], json!({ "byteLength": 48 }));
         file.json["bufferViews"][0]["buffer"] = json!(1);
-        assert_compressed(&file, name);
+        assert_compression(&file, name);
     }
 }
 
@@ -151,7 +151,7 @@ fn a_node_has_one_parent_and_is_shown_once() {
     file.json["nodes"][2] = json!({});
     for roots in [json!([0, 1]), json!([1, 0]), json!([1])] {
         file.json["scenes"][0]["nodes"] = roots;
-        assert_close(&file.points(), &moved(|p| p + Vec3::new(5.0, 0.0, 0.0)));
+        assert_close(&file.points(), &transform(|p| p + Vec3::new(5.0, 0.0, 0.0)));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Objects and plates that are chosen: numbers count as slicers count them, and refusals say what there is.
 
-use super::super::super::{Selection, read_selected};
+use super::super::super::{Selection, read_selection};
 use super::roles::{cube, items};
 use super::*;
 
@@ -38,7 +38,7 @@ fn figure_and_base(names: [&str; 2]) -> Vec<u8> {
 
 fn choose(bytes: &[u8], object: Option<&str>, plate: Option<&str>) -> Result<Loaded, ReadError> {
     let [object, plate] = [object, plate].map(|name| name.map(str::to_owned));
-    read_selected(bytes, None, &Selection { object, plate })
+    read_selection(bytes, None, &Selection { object, plate })
 }
 
 #[test]
@@ -49,8 +49,8 @@ fn instances_that_are_switched_off_count_where_a_plate_names_instances() {
     assert_eq!(names, ["base", "figure"]);
     let bounds = second.mesh.bounds();
     assert_eq!((bounds.min.x, bounds.max.x), (100.0, 210.0));
-    assert_told(&second, "not to print: 1; left out");
-    assert_told(&second, "2 of 2 objects or parts were taken");
+    assert_note(&second, "not to print: 1; left out");
+    assert_note(&second, "2 of 2 objects or parts were taken");
     let first = choose(&bytes, None, Some("1")).unwrap_err().to_string();
     assert!(
         first.contains("plate 1 holds nothing that the slicer is to print") && first.contains("2 \"Big\""),
@@ -75,8 +75,8 @@ fn where_all_is_switched_off_all_is_taken_and_told() {
     let build = items(&[1]).replace("/>", " printable=\"0\"/>");
     let loaded = read_model(&cube(1, ""), &build).unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 12);
-    assert_told(&loaded, "every object is switched off");
-    assert_told(&loaded, "all were taken");
+    assert_note(&loaded, "every object is switched off");
+    assert_note(&loaded, "all were taken");
 }
 
 #[test]
@@ -88,9 +88,9 @@ fn refusals_name_the_plate_and_the_parts_and_notes_count_what_was_taken() {
         "{refused}"
     );
     let taken = choose(&bytes, Some("base"), Some("2")).unwrap();
-    assert_told(&taken, "1 of 2 objects or parts was taken");
+    assert_note(&taken, "1 of 2 objects or parts was taken");
     assert!(!taken.notes.iter().any(|note| note.contains("all were read")));
-    assert_told(
+    assert_note(
         &read_mesh(&bytes, None).unwrap(),
         "the file has 2 objects or parts; all were read: base, figure",
     );

@@ -1,12 +1,12 @@
 //! Parts that are printed, cut out, left out or rejected, according to the file.
 
-use super::super::super::{Selection, read_selected};
+use super::super::super::{Selection, read_selection};
 use super::*;
 use shellock_geom::TriMesh;
 use shellock_testkit::shapes::cuboid;
 
 /// An object of a box from `min` to `max`; `more` goes before its mesh.
-fn boxed(id: u32, attributes: &str, more: &str, min: [f64; 3], max: [f64; 3]) -> String {
+fn box_of(id: u32, attributes: &str, more: &str, min: [f64; 3], max: [f64; 3]) -> String {
     let mesh = mesh_xml(&cuboid(min, max).to_mesh());
     format!("<object id=\"{id}\" {attributes}>{more}{mesh}</object>")
 }
@@ -20,12 +20,12 @@ fn mesh_xml(mesh: &TriMesh) -> String {
 }
 
 pub(super) fn cube(id: u32, attributes: &str) -> String {
-    boxed(id, attributes, "", [0.0; 3], [10.0; 3])
+    box_of(id, attributes, "", [0.0; 3], [10.0; 3])
 }
 
 /// A box that protrudes from [`cube`] along x.
 fn bar(id: u32, attributes: &str, more: &str) -> String {
-    boxed(id, attributes, more, [8.0, 4.0, 4.0], [20.0, 6.0, 6.0])
+    box_of(id, attributes, more, [8.0, 4.0, 4.0], [20.0, 6.0, 6.0])
 }
 
 pub(super) fn items(ids: &[u32]) -> String {
@@ -63,8 +63,8 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
             (12, 1000.0),
             "{kind}"
         );
-        assert_told(&loaded, word);
-        assert_told(&loaded, "\"extra\"");
+        assert_note(&loaded, word);
+        assert_note(&loaded, "\"extra\"");
     }
     let marks = [
         "support_mesh",
@@ -80,7 +80,7 @@ fn objects_of_other_types_and_of_cura_s_marks_are_left_out_and_told() {
             let build = format!("<item objectid=\"1\"/><item objectid=\"2\">{of_item}</item>");
             let loaded = read_model(&resources, &build).unwrap();
             assert_eq!(volume(&loaded), 1000.0, "{mark}");
-            assert_told(&loaded, "left out as");
+            assert_note(&loaded, "left out as");
             let off = read_model(&resources.replace("rue", "alse"), &build.replace("rue", "alse")).unwrap();
             assert_eq!(off.mesh.triangles.len(), 24, "{mark} is off");
         }
@@ -98,7 +98,7 @@ pub(super) fn parts_of(second: &str) -> String {
 
 #[test]
 fn negative_volumes_are_cut_out_of_their_own_object_alone() {
-    let beside = boxed(4, "", "", [30.0, 0.0, 0.0], [40.0, 10.0, 10.0]);
+    let beside = box_of(4, "", "", [30.0, 0.0, 0.0], [40.0, 10.0, 10.0]);
     let parts = cube(1, "")
         + &bar(2, "", "")
         + &beside
@@ -111,7 +111,7 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
         "{}",
         volume(&loaded)
     );
-    assert_told(&loaded, "cut out as a negative volume: \"hole\"");
+    assert_note(&loaded, "cut out as a negative volume: \"hole\"");
     assert!(loaded.file_face.is_sorted() && loaded.n_file_faces() > 24);
     assert_eq!(loaded.file_face.len(), loaded.mesh.triangles.len());
     // A range of an object's triangles, as in PrusaSlicer.
@@ -137,13 +137,13 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
         "component objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 500 0 0\"",
     );
     let loaded = with_settings(&parts, &items(&[3, 4]), BAMBU, &away).unwrap();
-    assert_told(&loaded, "does not meet");
+    assert_note(&loaded, "does not meet");
     // A cutter that lacks a triangle, and one that takes all away.
     let lacking = parts_of(&bar(2, "", "").replacen("<triangle v1", "<lost v1", 1));
     let loaded = with_settings(&lacking, &items(&[3]), BAMBU, bambu).unwrap();
     assert!((volume(&loaded) - 992.0).abs() < 1e-9, "{}", volume(&loaded));
-    assert_told(&loaded, "its surface had holes, which were closed");
-    let all = parts_of(&boxed(2, "", "", [-1.0; 3], [11.0; 3]));
+    assert_note(&loaded, "its surface had holes, which were closed");
+    let all = parts_of(&box_of(2, "", "", [-1.0; 3], [11.0; 3]));
     let refused = with_settings(&all, &items(&[3]), BAMBU, bambu)
         .unwrap_err()
         .to_string();
@@ -197,7 +197,7 @@ fn a_role_belongs_to_a_component_of_an_object_and_not_to_the_mesh_that_others_sh
          p:path=\"/3D/q.model\" objectid=\"1\"/></components></object>",
         &items(&[3]),
     );
-    let second = model(&boxed(1, "", "", [0.0, 0.0, 10.0], [10.0, 10.0, 30.0]), "");
+    let second = model(&box_of(1, "", "", [0.0, 0.0, 10.0], [10.0, 10.0, 30.0]), "");
     let settings = r#"<config><object id="3"><part id="1"><metadata key="extruder" value="1"/></part>
         <part id="1"><metadata key="extruder" value="5"/></part></object></config>"#;
     let parts = [
@@ -287,7 +287,7 @@ fn objects_and_plates_are_known_by_their_names_and_can_be_chosen() {
     assert_eq!(titles, ["cat", "own", "object 3"]);
     let select = |object: Option<&str>, plate: Option<&str>| {
         let [object, plate] = [object, plate].map(|name| name.map(str::to_owned));
-        read_selected(&bytes, None, &Selection { object, plate })
+        read_selection(&bytes, None, &Selection { object, plate })
     };
     let cat = select(Some("CAT"), None).unwrap();
     assert_eq!(
@@ -328,7 +328,7 @@ fn a_unit_is_stated_or_the_default() {
     let with = |text: &str| {
         let root = model(&cube(1, ""), &items(&[1])).replacen("unit=\"inch\"", text, 1);
         let loaded = read_mesh(&package(&[(USUAL_ROOT, &root)]), None).unwrap();
-        (loaded.unit_mm, loaded.unit_is_stated)
+        (loaded.unit_mm, loaded.has_unit)
     };
     assert_eq!(with("unit=\"millimeter\""), (Some(1.0), true));
     assert_eq!(with("xmlns:unit=\"urn:x\""), (Some(1.0), false));
