@@ -445,9 +445,9 @@ impl ChosenSizes {
         own.for_each(|(_, most)| most.0 = most.0.min(most_mm));
     }
 
-    /// Enlarges the connectors of a pair to the largest size that fits, for the use `done` to the kit.
+    /// Enlarges the connectors of a pair to the largest size that fits, for the use `load` to the kit.
     /// Returns true if they grew.
-    pub fn raise(&mut self, [a, b]: [PatchId; 2], done: &'static str) -> bool {
+    pub fn raise(&mut self, [a, b]: [PatchId; 2], load: &'static str) -> bool {
         /// Least growth that counts as a change, mm.
         const LEAST_MM: f64 = 0.05;
         let pair = [a.min(b), a.max(b)];
@@ -461,7 +461,7 @@ impl ChosenSizes {
             at,
             from_mm,
             to_mm,
-            load: done,
+            load,
         });
         true
     }

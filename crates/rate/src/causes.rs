@@ -116,15 +116,15 @@ impl Diagnostic for Cause {
             )
             .by(&["pieces"]),
             Self::BearsLittle {
-                load: done,
+                load,
                 bears,
                 requirement,
                 gives_way,
             } => Told::warning(
                 "bears-little",
                 format!(
-                    "{done} the kit withstands {bears}, not {requirement}: then {gives_way} between pieces {} and \
-                     {}; handle it with care there, print it larger, or make fewer pieces",
+                    "{load} the kit withstands {bears}, not {requirement}: then {gives_way} between \
+                     pieces {} and {}; handle it with care there, print it larger, or make fewer pieces",
                     number(pieces, 0),
                     number(pieces, 1)
                 ),

@@ -72,11 +72,8 @@ pub(super) fn strengthen(
         match wall {
             Permit::Late => late = Some(Step::Thicken),
             _ => {
-                let done = weakest.deed.words().to_owned();
-                changes.push(Change::Thicken(Thicker {
-                    thickness_mm,
-                    load: done,
-                }));
+                let load = weakest.deed.words().to_owned();
+                changes.push(Change::Thicken(Thicker { thickness_mm, load }));
             }
         }
     }
