@@ -39,7 +39,7 @@ struct Kit(embed::Kit);
 impl Kit {
     #[getter]
     fn passed(&self) -> bool {
-        self.0.passed
+        self.0.has_passed
     }
 
     #[getter]
@@ -64,7 +64,7 @@ impl Kit {
     }
 
     fn save(&self, py: Python<'_>, folder: PathBuf, force: bool) -> PyResult<()> {
-        py.detach(|| self.0.save(&folder, force)).map_err(raised)
+        py.detach(|| self.0.save(&folder, force)).map_err(exception)
     }
 }
 
@@ -82,7 +82,7 @@ fn design(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Kit> {
     let input = Input::new(&points, &triangles, labels.as_ref(), options)?;
-    waited(py, progress, |news, stop| {
+    wait_for(py, progress, |news, stop| {
         embed::design(&input.request(name), news, stop)
     })
     .map(Kit)
@@ -98,10 +98,10 @@ fn build(
     options: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Kit> {
-    let options = &chosen(options)?;
+    let options = &parse_options(options)?;
     let model = Source::File(file);
     let request = Request { model, name, options };
-    waited(py, progress, |news, stop| embed::design(&request, news, stop)).map(Kit)
+    wait_for(py, progress, |news, stop| embed::design(&request, news, stop)).map(Kit)
 }
 
 /// Divides a surface. Returns the number of the piece of each triangle, from 1.
@@ -116,7 +116,7 @@ fn segment(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<u32>> {
     let input = Input::new(&points, &triangles, labels.as_ref(), options)?;
-    waited(py, progress, |news, stop| {
+    wait_for(py, progress, |news, stop| {
         embed::segment(&input.request("model.ply"), news, stop)
     })
 }
@@ -131,7 +131,7 @@ fn verify(
 ) -> PyResult<String> {
     let meshes: PyResult<Vec<TriMesh>> = pieces.iter().map(|(p, t)| mesh(p, t)).collect();
     let meshes = meshes?;
-    let told = waited(py, None, |_, stop| {
+    let told = wait_for(py, None, |_, stop| {
         embed::verify(&meshes, &pulled_out_along, clearance, stop)
     })?;
     Ok(json(&told))
@@ -141,7 +141,7 @@ fn verify(
 #[pyfunction]
 fn check(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(String, String, String)>> {
     let found = py.detach(|| shellock_check::check(&folder));
-    let found = found.map_err(|message| raised(wrong(message)))?;
+    let found = found.map_err(|message| exception(wrong(message)))?;
     let word = |verdict| match verdict {
         Verdict::Confirmed => "confirmed",
         Verdict::Refuted => "refuted",
@@ -154,25 +154,26 @@ fn check(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(String, String, Strin
 /// Writes the files of a kit to a folder.
 #[pyfunction]
 fn save(py: Python<'_>, files: Vec<(String, Vec<u8>)>, folder: PathBuf, force: bool) -> PyResult<()> {
-    py.detach(|| embed::save(&files, &folder, force)).map_err(raised)
+    py.detach(|| embed::save(&files, &folder, force))
+        .map_err(exception)
 }
 
 /// Writes one file atomically: either all of it or nothing.
 #[pyfunction]
 fn write_file(path: PathBuf, content: &[u8]) -> PyResult<()> {
-    embed::write_file(&path, content).map_err(raised)
+    embed::write_file(&path, content).map_err(exception)
 }
 
 /// Lists all models below a folder, except in `out`, with the paths of their kits.
 #[pyfunction]
 fn models(folder: PathBuf, out: Option<PathBuf>) -> PyResult<Vec<(PathBuf, PathBuf)>> {
-    embed::models(&folder, out.as_deref()).map_err(raised)
+    embed::models(&folder, out.as_deref()).map_err(exception)
 }
 
 /// Returns the tables of a batch with their file names, from a JSON list of records.
 #[pyfunction]
 fn tables<'py>(py: Python<'py>, records: &str) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
-    let files = embed::tables(records).map_err(raised)?;
+    let files = embed::tables(records).map_err(exception)?;
     let bytes = |(name, content): (String, Vec<u8>)| (name, PyBytes::new(py, &content));
     Ok(files.into_iter().map(bytes).collect())
 }
@@ -212,7 +213,7 @@ impl Input {
         Ok(Self {
             mesh: mesh(points, triangles)?,
             labels: labels.map(|labels| labels.as_array().to_vec()),
-            options: chosen(options)?,
+            options: parse_options(options)?,
         })
     }
 
@@ -226,9 +227,9 @@ impl Input {
 }
 
 /// Reads options from a JSON object with their names and values.
-fn chosen(options: &str) -> PyResult<Options> {
-    let values = serde_json::from_str(options).map_err(|e| raised(wrong(format!("options: {e}"))))?;
-    Options::named(&values).map_err(|failure| raised(failure.into()))
+fn parse_options(options: &str) -> PyResult<Options> {
+    let values = serde_json::from_str(options).map_err(|e| exception(wrong(format!("options: {e}"))))?;
+    Options::from_names(&values).map_err(|failure| exception(failure.into()))
 }
 
 fn json(value: &impl serde::Serialize) -> String {
@@ -238,13 +239,13 @@ fn json(value: &impl serde::Serialize) -> String {
 fn mesh(points: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'_, u32>) -> PyResult<TriMesh> {
     let (points, triangles) = (points.as_array(), triangles.as_array());
     if points.ncols() != 3 || triangles.ncols() != 3 {
-        return Err(raised(wrong(
+        return Err(exception(wrong(
             "points and triangles have three columns each".into(),
         )));
     }
     let n_points = points.nrows();
     if triangles.iter().any(|&v| v as usize >= n_points) {
-        return Err(raised(wrong(format!(
+        return Err(exception(wrong(format!(
             "a triangle names a point that is none of the {n_points}"
         ))));
     }
@@ -268,7 +269,7 @@ fn wrong(message: String) -> Problem {
     Problem::wrong(message)
 }
 
-fn raised(problem: Problem) -> PyErr {
+fn exception(problem: Problem) -> PyErr {
     Refused::new_err((problem.code, problem.message, problem.at))
 }
 
@@ -282,7 +283,7 @@ struct Event {
 
 /// Runs `job` in a thread of its own, while this thread checks for Ctrl-C and calls `progress`. The first
 /// exception stops the job and is raised after the job has ended; `progress` is not called after it.
-fn waited<T: Send>(
+fn wait_for<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
     job: impl FnOnce(&(dyn Fn(News<'_>) + Sync), &Arc<AtomicBool>) -> Result<T, Problem> + Send,
@@ -312,7 +313,7 @@ fn waited<T: Send>(
             });
             let heard = match event {
                 Ok(_) if interrupt.is_some() => Ok(()),
-                Ok(event) => told(py, progress.as_ref(), &event),
+                Ok(event) => report_event(py, progress.as_ref(), &event),
                 Err(RecvTimeoutError::Timeout) => py.check_signals(),
                 Err(RecvTimeoutError::Disconnected) => break,
             };
@@ -325,7 +326,7 @@ fn waited<T: Send>(
     });
     match (interrupt, ended) {
         (Some(e), _) => Err(e),
-        (None, Ok(result)) => result.map_err(raised),
+        (None, Ok(result)) => result.map_err(exception),
         (None, Err(_)) => Err(PyRuntimeError::new_err(
             "the program failed where it never should: please report the model",
         )),
@@ -349,7 +350,7 @@ fn event(news: News<'_>) -> Event {
     }
 }
 
-fn told(py: Python<'_>, progress: Option<&Py<PyAny>>, event: &Event) -> PyResult<()> {
+fn report_event(py: Python<'_>, progress: Option<&Py<PyAny>>, event: &Event) -> PyResult<()> {
     let Some(progress) = progress else {
         return Ok(());
     };

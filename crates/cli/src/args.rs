@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use shellock::coupon::N_FITS;
-use shellock_job::options::{printer_called, units};
+use shellock_job::options::{find_printer, units};
 use shellock_print::Printer;
 
 pub use blows::Blows;
@@ -337,6 +337,6 @@ pub struct CouponOptions {
 impl CouponOptions {
     /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
-        printer_called(&self.printer, &self.own_printers)
+        find_printer(&self.printer, &self.own_printers)
     }
 }

@@ -31,7 +31,7 @@ pub struct Session {
     /// True if every check, note and figure is printed.
     pub is_verbose: bool,
     /// Form in which progress is shown.
-    pub shown: progress::Shown,
+    pub progress_form: progress::Shown,
     /// Stop flag, which becomes true with Ctrl-C, start time, and display of single stages.
     pub job: shellock_job::Session,
 }
@@ -39,12 +39,12 @@ pub struct Session {
 impl Session {
     /// Creates a session that begins now.
     fn new(cli: &args::Cli) -> Self {
-        let shown = shown(cli);
+        let shown = progress_form(cli);
         let stop = Arc::new(AtomicBool::new(false));
         Self {
             is_json: cli.json,
             is_verbose: cli.verbose,
-            shown,
+            progress_form: shown,
             job: shellock_job::Session::new(&stop, move |name| {
                 Box::new(progress::OneStage::begin(shown, name))
             }),
@@ -107,7 +107,7 @@ fn report_panics() {
             .downcast_ref::<String>()
             .filter(|what| what.starts_with("failed printing to stdout"))
         {
-            Some(what) => unprinted(what),
+            Some(what) => abort_output(what),
             None => tell(panic),
         }
     }));
@@ -159,7 +159,7 @@ fn refuse(is_json: bool, problem: &str, code: u8) -> ExitCode {
 
 /// Ends the program when standard output fails. A full disk is reported; a reader that closed the pipe is
 /// not.
-fn unprinted(what: &str) -> ! {
+fn abort_output(what: &str) -> ! {
     if !what.contains("Broken pipe") {
         eprintln!("error: {what}");
     }
@@ -167,7 +167,7 @@ fn unprinted(what: &str) -> ! {
 }
 
 /// Form of progress for the options: events with JSON, nothing when quiet, else for people.
-fn shown(cli: &args::Cli) -> progress::Shown {
+fn progress_form(cli: &args::Cli) -> progress::Shown {
     match (cli.quiet, cli.json) {
         (true, _) => progress::Shown::Nothing,
         (false, true) => progress::Shown::Events,

@@ -9,7 +9,7 @@ use shellock_job::input::Model;
 use shellock_job::output::{Destination, Summary};
 use shellock_job::place::Standing;
 use shellock_job::printing::Printing;
-use shellock_job::told::{bearing, fits, quality, tried, weakest};
+use shellock_job::told::{bearing, fits, list_effort, quality, weakest};
 
 use crate::Session;
 use crate::progress::Shown;
@@ -20,18 +20,18 @@ const MOST_TOLD: usize = 5;
 /// A finished kit, with everything that its report needs.
 pub struct Finished<'a> {
     pub to: &'a Destination,
-    pub made: &'a Design,
+    pub design: &'a Design,
     pub settings: &'a Settings,
     pub summary: &'a Summary,
     pub warnings: &'a [Warning],
-    pub standing: &'a Standing,
+    pub upright: &'a Standing,
     pub printing: &'a Printing,
 }
 
 impl Finished<'_> {
     /// Prints the whole report for people: figures, warnings, and one verdict at the end.
     pub fn print(&self, session: &Session) {
-        let (made, standing) = (self.made, self.standing);
+        let (made, standing) = (self.design, self.upright);
         let verdict = &made.kit.verification;
         println!(
             "{} pieces, piece {} is the key; walls {:.1} mm; {:.0} % of the solid model's material",
@@ -65,7 +65,7 @@ impl Finished<'_> {
     }
 
     fn print_figures(&self, session: &Session) {
-        let (made, standing) = (self.made, self.standing);
+        let (made, standing) = (self.design, self.upright);
         bears_lines(&made.kit.holding, standing)
             .into_iter()
             .for_each(|line| println!("{line}"));
@@ -87,7 +87,7 @@ impl Finished<'_> {
             "connectors on {:.0} % of the seam length that fits any",
             100.0 * self.summary.connector_share
         );
-        println!("{}", tried(&made.effort));
+        println!("{}", list_effort(&made.effort));
     }
 }
 
@@ -131,7 +131,7 @@ fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) ->
 /// standard error in quiet mode. With JSON they are part of the result instead.
 pub fn print_input_warnings(session: &Session, model: &Model) {
     for warning in &model.warnings {
-        match session.shown {
+        match session.progress_form {
             Shown::ForPeople => println!("{}: {warning}", warning.severity()),
             Shown::Nothing if !session.is_json => eprintln!("{}: {warning}", warning.severity()),
             _ => {}

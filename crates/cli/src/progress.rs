@@ -25,7 +25,7 @@ pub enum Shown {
 pub struct Display {
     bar: Mutex<Option<ProgressBar>>,
     is_terminal: bool,
-    shown: Shown,
+    form: Shown,
     since: Instant,
     watch: Stopwatch,
     course: Option<Mutex<Course>>,
@@ -37,7 +37,7 @@ impl Display {
         Self {
             bar: Mutex::new(None),
             is_terminal: std::io::stderr().is_terminal(),
-            shown,
+            form: shown,
             since: Instant::now(),
             watch: Stopwatch::start(),
             course: None,
@@ -71,7 +71,7 @@ impl Display {
         if let Progress::Stage { name, .. } = progress {
             self.watch.begin(name);
         }
-        match self.shown {
+        match self.form {
             Shown::ForPeople => self.show_people(progress),
             Shown::Events => self.show_event(&progress),
             Shown::Nothing => {}
@@ -89,7 +89,7 @@ impl Display {
                     name: name.to_owned(),
                     number: stand.map(|stand| stand.number),
                     seconds,
-                    seconds_left: stand.map(|stand| stand.left.map(|left| left.as_secs_f64().round())),
+                    seconds_left: stand.map(|stand| stand.time_left.map(|left| left.as_secs_f64().round())),
                 });
             }
             Progress::Note(text) => print_event(&Event::Note {
@@ -107,9 +107,9 @@ impl Display {
                 if let Some(old) = bar.take() {
                     old.finish_and_clear();
                 }
-                *bar = Some(stage_bar(&self.named(name, Stand::timed_words), n_steps));
+                *bar = Some(stage_bar(&self.stage_name(name, Stand::timed_words), n_steps));
             }
-            Progress::Stage { name, .. } => eprintln!("{} …", self.named(name, Stand::words)),
+            Progress::Stage { name, .. } => eprintln!("{} …", self.stage_name(name, Stand::words)),
             Progress::Step => {
                 if let Some(bar) = bar.as_ref() {
                     bar.inc(1);
@@ -123,14 +123,14 @@ impl Display {
     }
 
     /// Name of a stage with its number, if it has one.
-    fn named(&self, name: &str, words: impl Fn(&Stand, &str) -> String) -> String {
+    fn stage_name(&self, name: &str, words: impl Fn(&Stand, &str) -> String) -> String {
         self.stand(name)
             .map_or_else(|| name.to_owned(), |stand| words(&stand, name))
     }
 
     /// Removes the last bar; with events, also prints the time that the stages took.
     pub fn finish(&self) {
-        if self.shown == Shown::Events {
+        if self.form == Shown::Events {
             print_event(&Event::Effort {
                 seconds: self.since.elapsed().as_secs_f64(),
                 stages: self.stages(),

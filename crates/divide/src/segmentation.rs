@@ -28,7 +28,7 @@ pub use creases::usual_n_pieces;
 pub use error::SegmentationError;
 use fewer::{disagreement, with_fewer_parts};
 use halve::halve_long_edges;
-pub use keep_whole::{KeepWhole, resolved, whole};
+pub use keep_whole::{KeepWhole, resolve_regions, whole};
 use mend::{held_twice, mirror_images};
 pub use method::{Method, automatic_labels, mirrored_labels, symmetry_plane};
 use method::{automatic_on, creases_on};
@@ -147,7 +147,7 @@ pub struct FaceLabels {
 impl FaceLabels {
     /// Makes each connected set of equal `label` a patch. Patches are numbered by label, then by their lowest
     /// triangle.
-    pub fn from_connected(topology: &Topology, label: &[u32]) -> Self {
+    pub fn from_components(topology: &Topology, label: &[u32]) -> Self {
         let (component, n_patches) = components(topology, |f, g| label[f as usize] == label[g as usize]);
         let mut order: Vec<(u32, u32)> = vec![(u32::MAX, 0); n_patches];
         for (face, &c) in component.iter().enumerate() {
@@ -179,7 +179,7 @@ impl FaceLabels {
         self.n_patches
     }
 
-    fn inherited(&self, source_face: &[u32]) -> Self {
+    fn inherit(&self, source_face: &[u32]) -> Self {
         let patch_of_face = source_face
             .iter()
             .map(|&f| self.patch_of_face[f as usize])
@@ -218,7 +218,7 @@ pub fn segment(
 ) -> Result<SegmentedSurface, SegmentationError> {
     ctx.stage("segmentation", 0)?;
     let params = &SegmentationParams {
-        keep_whole: resolved(&params.keep_whole, solid, labels)?,
+        keep_whole: resolve_regions(&params.keep_whole, solid, labels)?,
         ..params.clone()
     };
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
@@ -227,11 +227,11 @@ pub fn segment(
         ctx.note(&format!("{method} knows no symmetry: auto and random-cuts do"));
     }
     let (fine, source_face) = halve_long_edges(params, solid);
-    let ground = Ground::keeping(params, &fine, &source_face);
+    let ground = Ground::with_regions(params, &fine, &source_face);
     let mut surface = match given {
         Some(labels) => {
-            let labels = labels.inherited(&source_face);
-            let kept = keep_whole::gathered(ctx, params, &fine, &ground.whole, labels.clone())?;
+            let labels = labels.inherit(&source_face);
+            let kept = keep_whole::gather_regions(ctx, params, &fine, &ground.whole, labels.clone())?;
             if kept != labels {
                 ctx.note(
                     "what is kept whole lies in several labels: it is given to the one that has most of it",
@@ -241,8 +241,8 @@ pub fn segment(
             let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
             found.expect("nothing is dearer than that").1
         }
-        None if params.method == Method::Creases => clustered(ctx, params, &ground)?,
-        None => proposed(ctx, params, &ground)?,
+        None if params.method == Method::Creases => try_clusterings(ctx, params, &ground)?,
+        None => propose(ctx, params, &ground)?,
     };
     surface
         .source_face
@@ -253,7 +253,7 @@ pub fn segment(
 }
 
 /// Tries clusterings with different seeds until one is cheap to repair. Returns the cheapest.
-fn clustered(
+fn try_clusterings(
     ctx: &Ctx,
     params: &SegmentationParams,
     ground: &Ground<'_>,
@@ -280,13 +280,13 @@ fn clustered(
 
 /// Divides by the method of `params`. If that leads to too many pieces, tries divisions with fewer parts as
 /// well. Returns the cheapest.
-fn proposed(
+fn propose(
     ctx: &Ctx,
     params: &SegmentationParams,
     ground: &Ground<'_>,
 ) -> Result<SegmentedSurface, SegmentationError> {
     let Some(drawn) = automatic_on(ctx, params, ground.solid, &ground.whole)? else {
-        return clustered(ctx, params, ground);
+        return try_clusterings(ctx, params, ground);
     };
     let wanted = params
         .n_pieces
@@ -294,8 +294,8 @@ fn proposed(
     let mirrored = mirror_images(params, ground);
     let origin = LabelOrigin::Drawn {
         labels: &drawn,
-        wanted,
-        mirrored: mirrored.as_ref(),
+        goal: wanted,
+        mirror: mirrored.as_ref(),
     };
     let mut best: Option<(f64, SegmentedSurface)> = None;
     for labels in with_fewer_parts(ground.solid, &drawn, wanted) {
@@ -306,7 +306,7 @@ fn proposed(
     let (_, drawn) = best.expect("nothing is dearer than the first");
     if !params.keep_whole.is_empty() && drawn.n_patches * FEWEST_SHARE < wanted {
         ctx.note("what is kept whole leaves few places to cut: pieces of similar size");
-        return clustered(ctx, params, ground);
+        return try_clusterings(ctx, params, ground);
     }
     Ok(drawn)
 }
@@ -320,16 +320,16 @@ enum LabelOrigin<'a> {
     /// Drawn by a method that cuts where people would; the result should have few enough pieces.
     Drawn {
         labels: &'a FaceLabels,
-        wanted: usize,
+        goal: usize,
         /// Mirror image of each triangle, if both sides are to be divided alike.
-        mirrored: Option<&'a Mirrored>,
+        mirror: Option<&'a Mirrored>,
     },
 }
 
 impl LabelOrigin<'_> {
-    fn mirrored(&self) -> Option<&Mirrored> {
+    fn mirror(&self) -> Option<&Mirrored> {
         match self {
-            Self::Drawn { mirrored, .. } => *mirrored,
+            Self::Drawn { mirror: mirrored, .. } => *mirrored,
             _ => None,
         }
     }
@@ -344,9 +344,9 @@ impl LabelOrigin<'_> {
                 let n_lost = Changes::between(labels, surface).n_lost() as f64;
                 LOST_LABEL_COST * n_lost + (after + n_lost - before)
             }
-            Self::Drawn { labels, wanted, .. } => {
-                DISAGREEMENT_COST * disagreement(labels, surface) + excess(surface.n_patches, wanted)
-            }
+            Self::Drawn {
+                labels, goal: wanted, ..
+            } => DISAGREEMENT_COST * disagreement(labels, surface) + excess(surface.n_patches, wanted),
         }
     }
 
@@ -357,7 +357,7 @@ impl LabelOrigin<'_> {
         match self {
             Self::Automatic => (after - before).max(2.0 * (before - after)),
             Self::User => (after - before).max(0.0),
-            Self::Drawn { wanted, .. } => excess(mended.n_patches(), wanted),
+            Self::Drawn { goal: wanted, .. } => excess(mended.n_patches(), wanted),
         }
     }
 
@@ -444,9 +444,9 @@ pub fn divide(
     surface: &SegmentedSurface,
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    changed(ctx, params, surface, |solid, labels| {
-        split::split_keeping(
-            &Ground::keeping(params, solid, &surface.source_face),
+    try_change(ctx, params, surface, |solid, labels| {
+        split::split_between_regions(
+            &Ground::with_regions(params, solid, &surface.source_face),
             labels,
             patch,
         )
@@ -460,7 +460,7 @@ pub fn refined_again(
     params: &SegmentationParams,
     surface: &SegmentedSurface,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    changed(ctx, params, surface, |_, labels| Some(labels.clone()))
+    try_change(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
 /// Joins each of `patches` to the neighbour with the longest common seam, then refines and smooths again.
@@ -484,10 +484,10 @@ pub fn unite(
         let own = number[usize::from(patch)];
         number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
     }
-    changed(ctx, params, surface, |solid, labels| {
+    try_change(ctx, params, surface, |solid, labels| {
         let label: Vec<u32> = labels.as_slice().iter().map(|&k| number[k as usize]).collect();
-        let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
-        enough_left(joined, surface)
+        let joined = FaceLabels::from_components(&Topology::new(solid), &label);
+        accept_join(joined, surface)
     })
 }
 
@@ -499,20 +499,20 @@ pub fn unite_two(
     surface: &SegmentedSurface,
     [a, b]: [PatchId; 2],
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    changed(ctx, params, surface, |solid, labels| {
+    try_change(ctx, params, surface, |solid, labels| {
         let label: Vec<u32> = labels
             .as_slice()
             .iter()
             .map(|&k| if k == b.0 { a.0 } else { k })
             .collect();
-        let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
-        enough_left(joined, surface)
+        let joined = FaceLabels::from_components(&Topology::new(solid), &label);
+        accept_join(joined, surface)
     })
 }
 
 /// Returns `joined` if it has fewer patches than `surface` and still at least three: of two pieces, each can
 /// leave the other.
-fn enough_left(joined: FaceLabels, surface: &SegmentedSurface) -> Option<FaceLabels> {
+fn accept_join(joined: FaceLabels, surface: &SegmentedSurface) -> Option<FaceLabels> {
     const FEWEST: usize = 3;
     (FEWEST..surface.n_patches)
         .contains(&joined.n_patches())
@@ -524,7 +524,7 @@ pub fn has_short_contacts(params: &SegmentationParams, surface: &SegmentedSurfac
     kept_limit_mm(params, surface) < params.min_contact_mm
 }
 
-fn changed(
+fn try_change(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
@@ -538,11 +538,11 @@ fn changed(
         return Ok(None);
     };
     let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
-    let labels = FaceLabels::from_connected(&Topology::new(&solid), &label);
+    let labels = FaceLabels::from_components(&Topology::new(&solid), &label);
     let Some(changed) = change(&solid, &labels) else {
         return Ok(None);
     };
-    let ground = Ground::keeping(params, &solid, &surface.source_face);
+    let ground = Ground::with_regions(params, &solid, &surface.source_face);
     let refined = refine_on(ctx, &limited, &ground, &changed)?;
     let mut next = match smooth_and_cut(ctx, params, &solid, &refined) {
         // Another choice of pieces may succeed.

@@ -74,7 +74,7 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     let first = worst.first?;
     Some(format!(
         "where it is {}: {} ({})",
-        worst.deed.done(),
+        worst.deed.words(),
         gives_way(&first),
         standing.words(first.at)
     ))
@@ -91,7 +91,7 @@ pub fn gives_way(first: &GivesWay) -> String {
 }
 
 /// Name of a load in a list, before its figure.
-pub fn told(told: Told) -> &'static str {
+pub fn load_name(told: Told) -> &'static str {
     match told {
         Told::Top => "pressed on its top",
         Told::Middle => "pressed on its middle",
@@ -105,13 +105,13 @@ pub fn told(told: Told) -> &'static str {
 }
 
 /// Load factor, capped at [`MOST_TIMES`]; larger ones make no difference to anybody.
-pub fn counted(borne: &LoadBorne) -> f64 {
+pub fn cap_factor(borne: &LoadBorne) -> f64 {
     borne.factor.unwrap_or(MOST_TIMES).min(MOST_TIMES)
 }
 
 /// Figure of a load: the mass or the height of fall that the kit can take.
 pub fn figure(borne: &LoadBorne) -> String {
-    let factor = counted(borne);
+    let factor = cap_factor(borne);
     let much = match borne.deed {
         Deed::FallUpright | Deed::Fall { .. } => metres(1e-3 * DROP_MM * factor * factor),
         _ => newtons(factor * borne.force_n),
@@ -127,12 +127,12 @@ pub fn figure(borne: &LoadBorne) -> String {
 
 /// Sentence that says what happens under the largest load that the kit can take.
 pub fn sentence(as_told: Told, borne: &LoadBorne) -> String {
-    let what = told(as_told)
+    let what = load_name(as_told)
         .trim_end_matches(" from")
         .trim_end_matches(", weighing");
     let is_fall = matches!(borne.deed, Deed::FallUpright | Deed::Fall { .. });
     let with = if is_fall { "from" } else { "with" };
-    let (figure, factor) = (figure(borne), counted(borne));
+    let (figure, factor) = (figure(borne), cap_factor(borne));
     match &borne.first {
         Some(first) if factor < HARDLY => {
             format!(

@@ -12,7 +12,7 @@ use crate::Session;
 use crate::failure::Failure;
 use crate::input::Model;
 use crate::options::{Options, Pieces};
-use crate::printing::described;
+use crate::printing::describe;
 
 /// Factor from one number of pieces to the next that is tried where some pieces are too large.
 const MORE_PIECES: f64 = 1.5;
@@ -67,7 +67,7 @@ impl<'a> Fitting<'a> {
                 return Err(Failure::Wrong(format!(
                     "even {MOST_PIECES} pieces do not fit the printer {}; make it smaller (--size), or \
                      choose another printer (--printer)",
-                    described(self.printer)
+                    describe(self.printer)
                 )));
             }
             n_pieces = ((n_pieces as f64 * SOME_MORE).ceil() as usize).min(MOST_PIECES);
@@ -110,14 +110,14 @@ pub fn too_large(
     };
     Ok(Some(format!(
         "{n_misfits} of {n} pieces will not fit the printer {}; {remedy}",
-        described(printer)
+        describe(printer)
     )))
 }
 
 /// Returns `params` with the smallest number of pieces that fits the printer if the options ask for that.
 ///
 /// Fails if the model has labels, since these already define the pieces, or if no number of pieces fits.
-pub fn fitted(
+pub fn fit_params(
     session: &Session,
     params: &Params,
     options: &Options,

@@ -6,7 +6,7 @@ use shellock::{Ctx, Warning};
 use shellock_print::Printer;
 
 use crate::Session;
-use crate::bed::{fitted, too_large};
+use crate::bed::{fit_params, too_large};
 use crate::clock::{Deadline, PlanClock};
 use crate::failure::Failure;
 use crate::fonts;
@@ -16,7 +16,7 @@ use crate::output::{Summary, files};
 use crate::printing::Printing;
 
 /// Returns the parameters, or all problems with the options in one error.
-pub fn checked(options: &Options) -> Result<Params, Failure> {
+pub fn check_options(options: &Options) -> Result<Params, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let params = options.params(&printer);
     let mut problems = params.problems();
@@ -71,7 +71,7 @@ pub struct Made {
 
 impl Made {
     /// Returns true if every check passes.
-    pub fn passed(&self) -> bool {
+    pub fn has_passed(&self) -> bool {
         self.design.kit.verification.has_passed()
     }
 }
@@ -94,7 +94,7 @@ impl<'a> Begun<'a> {
         params: &Params,
     ) -> Result<Self, Failure> {
         let printer = options.chosen_printer().map_err(Failure::Wrong)?;
-        let params = fitted(session, params, options, model)?;
+        let params = fit_params(session, params, options, model)?;
         let settings = Settings::resolve(&params);
         let mut notes = model.notes.clone();
         notes.extend(too_large(session, &settings, &printer, model)?);
@@ -113,9 +113,9 @@ impl<'a> Begun<'a> {
     }
 
     /// Makes the kit and reports progress to `show`.
-    pub fn made(self, session: &Session, show: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Made, Failure> {
+    pub fn make(self, session: &Session, show: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Made, Failure> {
         let (model, options) = (self.model, self.options);
-        let designed = timed(session, options, show, |ctx| {
+        let designed = with_limits(session, options, show, |ctx| {
             design(ctx, &self.params, &model.solid, model.labels.as_deref())
         });
         let design = match designed? {
@@ -127,7 +127,10 @@ impl<'a> Begun<'a> {
                 ..
             } => {
                 let told = no_plan(&reason, &blockers, is_cut_short);
-                return Err(Failure::NoPlan { told, is_cut_short });
+                return Err(Failure::NoPlan {
+                    reason: told,
+                    is_cut_short,
+                });
             }
         };
         let mut notes = self.notes;
@@ -171,24 +174,24 @@ impl<'a> Begun<'a> {
 }
 
 /// Divides and plans a model as a kit would be, without making it, and reports progress to `show`.
-pub fn planned(
+pub fn plan_model(
     session: &Session,
     model: &Model,
     options: &Options,
     params: &Params,
     show: &(dyn Fn(Progress<'_>) + Sync),
 ) -> Result<Planned, Failure> {
-    let planned = timed(session, options, show, |ctx| {
+    let planned = with_limits(session, options, show, |ctx| {
         design::plan(ctx, params, &model.solid, model.labels.as_deref())
     });
     planned?.map_err(|none| Failure::NoPlan {
-        told: no_plan(&none.reason, &[], none.is_cut_short),
+        reason: no_plan(&none.reason, &[], none.is_cut_short),
         is_cut_short: none.is_cut_short,
     })
 }
 
 /// Runs `work` with the limits that the options set: of work, which needs no clock, or of time.
-fn timed<T>(
+fn with_limits<T>(
     session: &Session,
     options: &Options,
     show: &(dyn Fn(Progress<'_>) + Sync),

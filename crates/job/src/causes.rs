@@ -46,14 +46,14 @@ impl Diagnostic for Cause {
             )
             .by(&["pieces", "printer"]),
             Self::LettersNotPrinted { letters } => {
-                Told::warning("letters-not-printed", letters_not_printed(letters))
+                Told::warning("letters-not-printed", unprintable_letters(letters))
             }
             Self::Failed { finding } => Told::problem("failed", format!("do not print this kit: {finding}")),
         }
     }
 }
 
-fn letters_not_printed(letters: &str) -> String {
+fn unprintable_letters(letters: &str) -> String {
     /// Number of letters that the sentence shows.
     const SHOWN: usize = 20;
     let shown: String = letters.chars().take(SHOWN).collect();

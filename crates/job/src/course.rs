@@ -35,7 +35,7 @@ pub struct Stand {
     /// Number of stages in all.
     pub of: usize,
     /// Estimated time until the kit is done, if it passes; `None` while too little is done.
-    pub left: Option<Duration>,
+    pub time_left: Option<Duration>,
 }
 
 /// Progress of a job. A kit that fails begins again at an earlier stage.
@@ -62,7 +62,7 @@ impl Course {
         Some(Stand {
             number: index + 1,
             of: STAGES.len(),
-            left,
+            time_left: left,
         })
     }
 }
@@ -76,7 +76,7 @@ impl Stand {
     /// Writes the position and the time left, which changes each time.
     pub fn timed_words(&self, name: &str) -> String {
         const STEP_S: f64 = 5.0;
-        let left = self.left.map_or_else(String::new, |left| {
+        let left = self.time_left.map_or_else(String::new, |left| {
             let s = ((left.as_secs_f64() / STEP_S).ceil() * STEP_S).max(STEP_S);
             format!(", about {s:.0} s left if it passes")
         });
@@ -93,13 +93,13 @@ mod tests {
         let (mut course, start) = (Course::default(), Instant::now());
         let after = |s: f64| start + Duration::from_secs_f64(s);
         let first = course.begin("thickness", after(0.0)).unwrap();
-        assert_eq!((first.number, first.of, first.left), (1, STAGES.len(), None));
+        assert_eq!((first.number, first.of, first.time_left), (1, STAGES.len(), None));
         let key = course.begin("key", after(12.0)).unwrap();
-        let left = key.left.unwrap().as_secs_f64();
+        let left = key.time_left.unwrap().as_secs_f64();
         assert!((left - 12.0 / 0.12 * 0.88).abs() < 1.0, "{left}");
         // The kit fails: the next one has no estimate yet.
         course.begin("verify", after(50.0)).unwrap();
-        assert_eq!(course.begin("segmentation", after(60.0)).unwrap().left, None);
+        assert_eq!(course.begin("segmentation", after(60.0)).unwrap().time_left, None);
         assert_eq!(course.begin("a plan of half the score", after(61.0)), None);
     }
 

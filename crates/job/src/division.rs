@@ -9,8 +9,8 @@ use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, PatchId, SegmentedSurface, Warning};
 
 use crate::Session;
-use crate::bed::fitted;
-use crate::build::checked;
+use crate::bed::fit_params;
+use crate::build::check_options;
 use crate::failure::Failure;
 use crate::input::Model;
 use crate::options::Options;
@@ -29,7 +29,7 @@ pub struct Division {
 
 /// Parameters that `model` is divided with.
 pub fn params(session: &Session, model: &Model, options: &Options) -> Result<SegmentationParams, Failure> {
-    let params = fitted(session, &checked(options)?, options, model)?;
+    let params = fit_params(session, &check_options(options)?, options, model)?;
     Ok(Settings::resolve(&params).segmentation)
 }
 
@@ -57,7 +57,7 @@ pub fn divide(
 }
 
 /// Divides the surface of `model` as the options ask.
-pub fn divided(
+pub fn divide_model(
     session: &Session,
     ctx: &Ctx,
     model: &Model,
@@ -115,7 +115,7 @@ impl Division {
         let disks = if odd.is_empty() {
             "all pieces".to_owned()
         } else {
-            format!("all but {}", listed(&odd))
+            format!("all but {}", list_pieces(&odd))
         };
         let n = pieces.len();
         let areas = format!(
@@ -190,20 +190,20 @@ fn of_contacts(contacts: &ContactFigures, params: &SegmentationParams) -> Vec<Li
     }
     vec![
         ("contacts", told),
-        ("held", held(contacts.n_faults, &contacts.hold_alone)),
+        ("held", hold_words(contacts.n_faults, &contacts.hold_alone)),
     ]
 }
 
-fn held(n_faults: usize, hold_alone: &[PatchId]) -> String {
+fn hold_words(n_faults: usize, hold_alone: &[PatchId]) -> String {
     match (n_faults, hold_alone) {
         (0, _) => "no piece alone holds others".to_owned(),
         (n, []) => format!("not together: {n} faults"),
         (n, [one]) => format!("piece {one} alone holds others: {n} faults"),
-        (n, several) => format!("pieces {} alone hold others: {n} faults", listed(several)),
+        (n, several) => format!("pieces {} alone hold others: {n} faults", list_pieces(several)),
     }
 }
 
-fn listed(pieces: &[PatchId]) -> String {
+fn list_pieces(pieces: &[PatchId]) -> String {
     pieces
         .iter()
         .map(PatchId::to_string)

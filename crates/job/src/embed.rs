@@ -18,7 +18,7 @@ use shellock_geom::weld::weld;
 
 use crate::Session;
 use crate::batch;
-use crate::build::{Begun, checked};
+use crate::build::{Begun, check_options};
 use crate::course::Course;
 use crate::division;
 use crate::failure::Failure;
@@ -94,7 +94,7 @@ pub struct Request<'a> {
     pub model: Source<'a>,
     /// Name of the model's file.
     pub name: &'a str,
-    /// Options of the kit; [`Options::named`] reads them by name.
+    /// Options of the kit; [`Options::from_names`] reads them by name.
     pub options: &'a Options,
 }
 
@@ -105,7 +105,7 @@ pub struct Kit {
     /// Pieces in order of installation, in assembled position, mm.
     pub pieces: Vec<TriMesh>,
     /// True if every check passes.
-    pub passed: bool,
+    pub has_passed: bool,
     /// Warnings, most important first.
     pub warnings: Vec<Warning>,
     /// Notes on changes to the model and to the choices.
@@ -127,13 +127,13 @@ pub fn design(
 ) -> Result<Kit, Problem> {
     let session = Session::silent(stop);
     let options = request.options;
-    let params = checked(options)?;
+    let params = check_options(options)?;
     let model = input::simple(&session, model(request)?, options)?;
     let course = Mutex::new(Course::default());
     let made =
-        Begun::new(&session, &model, options, &params)?.made(&session, &|p| tell(&course, news, &p))?;
+        Begun::new(&session, &model, options, &params)?.make(&session, &|p| tell(&course, news, &p))?;
     Ok(Kit {
-        passed: made.passed(),
+        has_passed: made.has_passed(),
         pieces: made
             .design
             .kit
@@ -155,11 +155,11 @@ pub fn segment(
     stop: &Arc<AtomicBool>,
 ) -> Result<Vec<u32>, Problem> {
     let session = Session::silent(stop);
-    checked(request.options)?;
+    check_options(request.options)?;
     let model = model(request)?;
     let course = Mutex::new(Course::default());
     let report = |p: Progress<'_>| tell(&course, news, &p);
-    let surface = division::divided(&session, &Ctx::new(&report, stop), &model, request.options)?;
+    let surface = division::divide_model(&session, &Ctx::new(&report, stop), &model, request.options)?;
     Ok(division::labels_of_file(&model, &surface))
 }
 
@@ -231,7 +231,7 @@ pub fn is_of_kit(name: &str) -> bool {
     is_of_kits(name)
 }
 
-/// Lists all options that [`Options::named`] reads.
+/// Lists all options that [`Options::from_names`] reads.
 pub fn options() -> Vec<Offer> {
     offers(&[], &[])
 }

@@ -43,10 +43,10 @@ pub enum Failure {
     #[error("{0}")]
     Wrong(String),
     /// No plan was found.
-    #[error("{told}")]
+    #[error("{reason}")]
     NoPlan {
         /// Reason, in words for people.
-        told: String,
+        reason: String,
         /// True if the time ran out.
         is_cut_short: bool,
     },
@@ -84,7 +84,7 @@ fn hint(error: &InputError, objects: &[String]) -> String {
     if objects.is_empty() {
         return " (--largest keeps the largest)".to_owned();
     }
-    let listed = listed(objects);
+    let listed = list_names(objects);
     let plate = if listed.contains("(plate ") {
         " or --plate N"
     } else {
@@ -97,7 +97,7 @@ fn hint(error: &InputError, objects: &[String]) -> String {
 }
 
 /// Lists the first names, and the number of those left out.
-pub fn listed(names: &[String]) -> String {
+pub fn list_names(names: &[String]) -> String {
     /// Number of names that a message lists.
     const N_LISTED: usize = 8;
     let first = names[..names.len().min(N_LISTED)].join(", ");

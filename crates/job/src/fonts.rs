@@ -58,7 +58,7 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
             break;
         }
         let i = order.remove(0);
-        if let Some(font) = loaded(&database, faces[i]) {
+        if let Some(font) = load_font(&database, faces[i]) {
             fonts.push(font);
             sought = &sought - &has[i];
         }
@@ -67,7 +67,7 @@ fn of_system(characters: BTreeSet<char>) -> Vec<ExtraFont> {
 }
 
 /// Copies a font out of its file.
-fn loaded(database: &Database, face: &FaceInfo) -> Option<ExtraFont> {
+fn load_font(database: &Database, face: &FaceInfo) -> Option<ExtraFont> {
     let (bytes, index) = database.with_face_data(face.id, |bytes, index| (bytes.to_vec(), index))?;
     ExtraFont::new(bytes, index)
 }

@@ -82,11 +82,11 @@ pub fn sha256(bytes: &[u8]) -> String {
 
 /// Loads the mesh in a file; also returns the file's bytes.
 pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
-    load_selected(path, &Selection::default())
+    load_selection(path, &Selection::default())
 }
 
 /// Loads the part of a file's mesh that `selection` names; also returns the file's bytes.
-pub fn load_selected(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<u8>), Failure> {
+pub fn load_selection(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
     let extension = path.extension().and_then(|e| e.to_str());
     let loaded = read_selection(&bytes, extension, selection).map_err(|source| Failure::NotAMesh {
@@ -114,7 +114,7 @@ pub fn repair_mode(no_repair: bool, largest: bool) -> RepairMode {
 }
 
 /// Repairs the mesh that was read from `path` into one body.
-pub fn repaired(
+pub fn repair_mesh(
     path: &Path,
     loaded: &Loaded,
     mode: RepairMode,
@@ -150,7 +150,7 @@ pub fn objects(loaded: &Loaded) -> Vec<String> {
 /// Reads the model in a file, scaled, with its labels.
 pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
     session.during("reading", || {
-        let (loaded, bytes) = load_selected(path, &selection(options))?;
+        let (loaded, bytes) = load_selection(path, &selection(options))?;
         model_of(path, &loaded, &bytes, options)
     })
 }
@@ -166,11 +166,11 @@ pub fn simple(session: &Session, model: Model, options: &Options) -> Result<Mode
     if n_triangles <= MANY_TRIANGLES || options.resolution == 0.0 {
         return Ok(model);
     }
-    session.during("simplifying", || simplified(model, options.resolution))
+    session.during("simplifying", || simplify_model(model, options.resolution))
 }
 
 /// Simplifies `model` to triangles within `resolution_mm` of its surface, and adds a note on the result.
-fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
+fn simplify_model(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
     let n_before = model.solid.mesh().triangles.len();
     match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
         Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
@@ -211,11 +211,11 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
         solid,
         source_face,
         repairs,
-    } = repaired(
+    } = repair_mesh(
         path,
         loaded,
         repair_mode(options.no_repair, options.largest),
-        options.inside_out.meant(),
+        options.inside_out.value(),
     )?;
     let file_face: Vec<u32> = source_face
         .iter()
@@ -398,7 +398,7 @@ mod tests {
     use super::*;
 
     /// A figure of the program, labelled in two halves, as if it came from a file with the same faces.
-    fn halved() -> Model {
+    fn vase_in_halves() -> Model {
         let (solid, _) = shellock_figure("vase", 40.0).expect("there is such a figure");
         let mut model = made_of(solid, 1.0, Path::new("vase.stl")).expect("it is small");
         let mesh = model.solid.mesh();
@@ -414,9 +414,9 @@ mod tests {
 
     #[test]
     fn a_simplified_model_keeps_its_labels_and_says_what_was_done() {
-        let model = halved();
+        let model = vase_in_halves();
         let n_before = model.solid.mesh().triangles.len();
-        let few = simplified(model, 0.05).unwrap();
+        let few = simplify_model(model, 0.05).unwrap();
         let mesh = few.solid.mesh();
         assert!(mesh.triangles.len() < n_before);
         let labels = few.labels.expect("labels stay");
@@ -440,7 +440,7 @@ mod tests {
     fn what_cannot_be_simplified_stays_and_is_told() {
         let solid = Solid::new(shellock_testkit::shapes::tetrahedron()).expect("closed");
         let model = made_of(solid.clone(), 1.0, Path::new("tetrahedron.stl")).expect("it is small");
-        let same = simplified(model, 0.01).unwrap();
+        let same = simplify_model(model, 0.01).unwrap();
         assert!(same.solid == solid);
         assert!(same.notes[0].contains("all are used"), "{:?}", same.notes);
     }

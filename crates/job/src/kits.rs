@@ -15,7 +15,7 @@ use shellock_kit::PlanFile;
 
 use crate::failure::Failure;
 use crate::files::write;
-use crate::input::{self, load, load_selected, read, sha256};
+use crate::input::{self, load, load_selection, read, sha256};
 use crate::options::Axis;
 use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::place::Standing;
@@ -25,7 +25,7 @@ use crate::shape::filled_again;
 pub struct Finished {
     folder: PathBuf,
     plan: PlanFile,
-    kit: Kit,
+    kit: KitOnDisk,
     solid: Solid,
 }
 
@@ -70,7 +70,7 @@ impl Finished {
     }
 
     /// Model in upright position, if the plan says which axis pointed up.
-    pub fn standing(&self) -> Option<Standing> {
+    pub fn upright(&self) -> Option<Standing> {
         let up = self.plan.up.and_then(Axis::of)?;
         Some(Standing::of(up, self.solid.mesh()))
     }
@@ -117,7 +117,7 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
         object: input.object.clone(),
         plate: input.plate.clone(),
     };
-    let (loaded, _) = load_selected(&model_path, &selection)?;
+    let (loaded, _) = load_selection(&model_path, &selection)?;
     let repairs: Vec<&str> = input.repairs.iter().map(|r| r.kind.as_str()).collect();
     // The finished kit already answers the question that other files raise: its repairs say what the body
     // means.
@@ -127,7 +127,7 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
         InsideOut::Unite
     };
     let mode = input::repair_mode(false, input.largest_only);
-    let solid = input::repaired(&model_path, &loaded, mode, inside_out)?.solid;
+    let solid = input::repair_mesh(&model_path, &loaded, mode, inside_out)?.solid;
     let t = input.transform;
     let mut mesh = solid.into_mesh();
     for p in &mut mesh.points {
@@ -141,7 +141,7 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
 }
 
 /// Pieces and order that a plan file names.
-pub struct Kit {
+pub struct KitOnDisk {
     /// Files of the pieces.
     pub files: Vec<PieceFile>,
     /// Meshes of the pieces, mm.
@@ -151,7 +151,7 @@ pub struct Kit {
 }
 
 /// Reads the piece files that a plan names, their meshes, and the order.
-pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Kit, Failure> {
+pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<KitOnDisk, Failure> {
     let order = plan.order().map_err(broken(kit))?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for piece in &plan.pieces {
@@ -174,7 +174,7 @@ pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Kit, Failure> {
         });
         meshes.push(weld(&loaded.mesh).mesh);
     }
-    Ok(Kit {
+    Ok(KitOnDisk {
         files,
         pieces: meshes.into_iter().collect(),
         order,

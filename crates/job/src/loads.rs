@@ -17,7 +17,7 @@ const LINE_POINTS: usize = 120;
 /// All loads that the page shows, turned upright by `stand`; empty if none were simulated.
 pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3) -> ReportLoads {
     let kit = &design.kit;
-    let (carriers, places) = carriers(&kit.deformed, kit.pieces.len());
+    let (carriers, places) = carriers(&kit.deformation, kit.pieces.len());
     let turned = |mesh: TriMesh| TriMesh {
         points: mesh.points.iter().map(|&p| stand(p)).collect(),
         ..mesh
@@ -26,12 +26,15 @@ pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3)
         let factor = shown_factor(load);
         let moved = |points: &Vec<usize>| points.iter().map(|&p| stand(factor * load.moved_mm[p])).collect();
         ReportLoad {
-            name: bears::told(load.told).to_owned(),
-            figure: bears::figure(&load.borne),
-            title: bears::sentence(load.told, &load.borne),
+            name: bears::load_name(load.kind).to_owned(),
+            figure: bears::figure(&load.capacity),
+            title: bears::sentence(load.kind, &load.capacity),
             arrows: arrows(load, &stand),
             floor: floor(load).map(|[at, normal]| [stand(at).to_array(), stand(normal).to_array()]),
-            place: load.borne.first.map(|first| place(&kit.surface, &first, &stand)),
+            place: load
+                .capacity
+                .first
+                .map(|first| place(&kit.surface, &first, &stand)),
             moved_mm: places.iter().map(moved).collect(),
         }
     };
@@ -41,14 +44,14 @@ pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3)
         title: "What it bears".into(),
         note: note(design),
         carriers: carriers.into_iter().map(turned).collect(),
-        loads: kit.deformed.loads.iter().map(load).collect(),
+        loads: kit.deformation.loads.iter().map(load).collect(),
         weakest: weakest.map(|(words, first)| (words, place(&kit.surface, &first, &stand))),
     }
 }
 
 /// Note that holds for all loads.
 fn note(design: &Design) -> String {
-    let is_there = |told| design.kit.deformed.loads.iter().any(|l| l.told == told);
+    let is_there = |told| design.kit.deformation.loads.iter().any(|l| l.kind == told);
     let top = if is_there(Told::Top) {
         ""
     } else {
@@ -63,7 +66,7 @@ fn note(design: &Design) -> String {
 
 /// Load factor at which a load is shown: the largest that the kit can take, where something begins to fail.
 fn shown_factor(load: &DeformedLoad) -> f64 {
-    let factor = bears::counted(&load.borne);
+    let factor = bears::cap_factor(&load.capacity);
     if factor > 0.0 { factor } else { 1.0 }
 }
 
@@ -88,7 +91,7 @@ fn carriers(deformed: &Deformed, n_pieces: usize) -> (Vec<TriMesh>, Vec<Vec<usiz
 
 /// Arrows of the forces that act, labelled with their figure or role.
 fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow> {
-    let words: [&str; 2] = match load.borne.deed {
+    let words: [&str; 2] = match load.capacity.deed {
         Deed::GripNarrow | Deed::GripWide => ["one finger", "the other"],
         Deed::FallUpright | Deed::Fall { .. } => ["the floor stops it", ""],
         Deed::Hang { .. } => ["held here", "its weight"],
@@ -97,7 +100,7 @@ fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow>
     let n = if floor(load).is_some() { 1 } else { 2 };
     let arrow = |(touch, words): (&Touch, &str)| ReportArrow {
         name: if words.is_empty() {
-            bears::figure(&load.borne)
+            bears::figure(&load.capacity)
         } else {
             words.to_owned()
         },
@@ -109,7 +112,7 @@ fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow>
 
 /// A point of the floor and its normal, for loads with a floor.
 fn floor(load: &DeformedLoad) -> Option<[Vec3; 2]> {
-    let touch = match load.borne.deed {
+    let touch = match load.capacity.deed {
         Deed::PressTop | Deed::PressMiddle | Deed::PressSide { .. } => load.touches.get(1),
         Deed::FallUpright | Deed::Fall { .. } => load.touches.first(),
         Deed::GripNarrow | Deed::GripWide | Deed::Hang { .. } => None,
@@ -170,7 +173,7 @@ mod tests {
     use super::*;
 
     /// Two pyramids on a hexagon, halved: the two pieces meet along a loop in the plane y = 0.
-    fn halved() -> SegmentedSurface {
+    fn two_halves() -> SegmentedSurface {
         let rim = (0..6).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_3).sin_cos();
             Vec3::new(cos, sin, 0.0)
@@ -191,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_seam_is_one_line_through_the_points_that_both_pieces_have() {
-        let surface = halved();
+        let surface = two_halves();
         let pieces = [PatchId(1), PatchId(0)];
         let line = seam_through(&surface, pieces, Vec3::X).unwrap();
         assert!(
@@ -203,7 +206,7 @@ mod tests {
 
     #[test]
     fn carriers_have_all_points_and_triangles_once() {
-        let surface = halved();
+        let surface = two_halves();
         let deformed = Deformed {
             surface: TriMesh {
                 points: (0..6).map(|i| Vec3::splat(f64::from(i))).collect(),

@@ -12,7 +12,7 @@ mod values;
 
 use std::path::PathBuf;
 
-pub use choices::{Choice, Choices, Offer, changed, offers, relabelled};
+pub use choices::{Choice, Choices, Offer, apply_changes, offers, relabel};
 pub use pieces::{Key, Pieces};
 use shellock::connector::ConnectorParams;
 use shellock::design::{self, KeySource, Params};
@@ -20,10 +20,10 @@ use shellock::segmentation::{KeepWhole, Method};
 use shellock::sizes::{SizeChoice, SizeRange};
 use shellock_mechanics::Material;
 use shellock_print::Printer;
-pub use table::{DECLARED, Declared, Kind, declared};
+pub use table::{DECLARED, Declared, Kind, declaration};
 use values::label;
 pub use values::{
-    Axis, InsideOutMeans, LabelsFrom, PaperSize, Thickness, Unit, Word, Words, material, printer_called, word,
+    Axis, InsideOutMeans, LabelsFrom, PaperSize, Thickness, Unit, Word, Words, find_printer, material, word,
 };
 
 /// Function that sets an option to the value that a text says; fails with the reason if it says none.
@@ -179,7 +179,7 @@ const REVISIONS_PER_SECOND: f64 = 20_000.0;
 impl Options {
     /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
-        printer_called(&self.printer, &self.own_printers)
+        find_printer(&self.printer, &self.own_printers)
     }
 
     /// Parameters of the library for pieces made on `printer`.

@@ -22,7 +22,7 @@ use crate::files::with_slashes;
 use crate::input::{Model, sha256};
 use crate::options::{Axis, Options};
 use crate::page;
-use crate::paint::painted;
+use crate::paint::paint_patches;
 use crate::printing::Printing;
 
 /// Name of the plan within a kit.
@@ -283,7 +283,7 @@ fn segmentation_files(name: &str, surface: &SegmentedSurface) -> [(String, Vec<u
     let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.number() as i32).collect();
     [
         ("segmentation.ply".into(), write_ply(&surface.mesh, Some(&labels))),
-        ("segmentation.3mf".into(), painted(name, surface).0),
+        ("segmentation.3mf".into(), paint_patches(name, surface).0),
     ]
 }
 
@@ -373,7 +373,7 @@ fn certificate(
         })
         .collect();
     let evidence = Evidence {
-        contacts: &design.kit.touching,
+        contacts: &design.kit.touches,
         verdict: &design.kit.verification,
         gaps: &design.gaps,
         play: Some(&design.kit.play),
@@ -436,12 +436,12 @@ fn stress_chart(options: &Options, settings: &Settings, design: &Design, strengt
         })
         .collect();
     strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| {
-        standing(options.up, v)
+        turn_upright(options.up, v)
     })
 }
 
 /// Turns a vector so that `up` becomes z.
-pub fn standing(up: Axis, v: Vec3) -> Vec3 {
+pub fn turn_upright(up: Axis, v: Vec3) -> Vec3 {
     match up {
         Axis::X => Vec3::new(-v.z, v.y, v.x),
         Axis::Y => Vec3::new(v.x, -v.z, v.y),
@@ -449,8 +449,8 @@ pub fn standing(up: Axis, v: Vec3) -> Vec3 {
     }
 }
 
-/// Turns a vector back: `lying(up, standing(up, v))` is `v`.
-pub fn lying(up: Axis, v: Vec3) -> Vec3 {
+/// Turns a vector back: `turn_back(up, turn_upright(up, v))` is `v`.
+pub fn turn_back(up: Axis, v: Vec3) -> Vec3 {
     match up {
         Axis::X => Vec3::new(v.z, v.y, -v.x),
         Axis::Y => Vec3::new(v.x, v.z, -v.y),

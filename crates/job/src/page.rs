@@ -20,7 +20,7 @@ use crate::fonts;
 use crate::input::Model;
 use crate::loads;
 use crate::options::Options;
-use crate::output::{Summary, connector_sizes, standing};
+use crate::output::{Summary, connector_sizes, turn_upright};
 use crate::place::Standing;
 use crate::printing::Printing;
 use crate::tabs;
@@ -39,8 +39,8 @@ pub fn report(
     summary: &Summary,
     (figures, printing): (Vec<(String, String)>, &Printing),
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
-    let stand = |v: Vec3| standing(options.up, v);
-    let shown = shown(design, stand);
+    let stand = |v: Vec3| turn_upright(options.up, v);
+    let shown = upright_pieces(design, stand);
     let standing = Standing::of(options.up, model.solid.mesh());
     let failed = design.kit.verification.findings.iter();
     let failed = failed.map(|finding| failure(finding, &standing));
@@ -79,12 +79,12 @@ pub fn report(
     let booklet = Booklet {
         title: title(&model.name),
         lines: cover_lines(&shown),
-        bears: borne(design, &data.loads.weakest),
+        bears: loads_on_page(design, &data.loads.weakest),
         pieces: data.pieces.clone(),
         before: if has_passed {
             tabs::before(printing)
         } else {
-            vec![tabs::failed()]
+            vec![tabs::failure_section()]
         },
         after: tabs::after(has_passed),
         paper: options.paper.into(),
@@ -177,7 +177,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
 }
 
 /// Loads as the booklet shows them.
-fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Borne> {
+fn loads_on_page(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Borne> {
     let holding = &design.kit.holding;
     let bears = holding.summary()?;
     let between = holding.weakest_use().and_then(|worst| worst.first);
@@ -213,7 +213,7 @@ fn failure(finding: &Finding, standing: &Standing) -> Warning {
 }
 
 /// Upright pieces, simplified to a tolerance that the eye cannot see.
-fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
+fn upright_pieces(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
     let all = design
         .kit
         .pieces
@@ -268,7 +268,7 @@ fn kit_facts(
             .iter()
             .map(|s| ("fall".into(), bearing(s, settings, standing))),
     );
-    if design.kit.deformed.loads.is_empty() {
+    if design.kit.deformation.loads.is_empty() {
         facts.extend(bearing_facts(design, standing));
     }
     facts.extend(plan_facts(design, standing));

@@ -10,7 +10,7 @@ const N_COLORS: u32 = 16;
 ///
 /// Patch k has colour k + 1, up to 16 patches. With more, patches share colours, but patches that touch get
 /// different ones where possible.
-pub fn painted(name: &str, surface: &SegmentedSurface) -> (Vec<u8>, bool) {
+pub fn paint_patches(name: &str, surface: &SegmentedSurface) -> (Vec<u8>, bool) {
     let is_distinct = surface.n_patches <= N_COLORS as usize;
     let color_of_patch = if is_distinct {
         (1..=surface.n_patches as u32).collect()
@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn up_to_sixteen_patches_have_their_own_colours_and_more_differ_from_their_neighbours() {
         for n in [2, 16, 17, 100] {
-            let (bytes, is_distinct) = painted("strip", &strip(n));
+            let (bytes, is_distinct) = paint_patches("strip", &strip(n));
             let loaded = read_mesh(&bytes, None).unwrap();
             let colors: Vec<i64> = loaded.face_labels().unwrap().iter().step_by(2).copied().collect();
             assert_eq!((is_distinct, colors.len()), (n <= 16, n));

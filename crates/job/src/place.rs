@@ -4,7 +4,7 @@ use shellock::verify::words::PlaceWords;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::options::Axis;
-use crate::output::standing;
+use crate::output::turn_upright;
 
 /// A model in upright position.
 pub struct Standing {
@@ -17,7 +17,7 @@ pub struct Standing {
 impl Standing {
     /// Creates it for a mesh whose axis `up` points upwards.
     pub fn of(up: Axis, mesh: &TriMesh) -> Self {
-        let bounds = Aabb::around(mesh.points.iter().map(|&p| standing(up, p)));
+        let bounds = Aabb::around(mesh.points.iter().map(|&p| turn_upright(up, p)));
         Self { up, bounds }
     }
 
@@ -25,7 +25,7 @@ impl Standing {
     pub fn words(&self, at: [f64; 3]) -> String {
         /// Share of the height within which a place counts as at the bottom or at the top.
         const END: f64 = 0.03;
-        let from_corner = standing(self.up, Vec3::from(at)) - self.bounds.min;
+        let from_corner = turn_upright(self.up, Vec3::from(at)) - self.bounds.min;
         let share = from_corner / self.bounds.size().max(Vec3::splat(f64::MIN_POSITIVE));
         let third = |share: f64, ends: [&'static str; 2]| match share {
             s if s < 1.0 / 3.0 => Some(ends[0]),
@@ -59,7 +59,7 @@ impl PlaceWords for Standing {
     fn way(&self, along: [f64; 3]) -> String {
         /// Components below this share of the length are left out: 22.5°.
         const LEAST: f64 = 0.38;
-        let d = standing(self.up, Vec3::from(along)).normalize_or_zero();
+        let d = turn_upright(self.up, Vec3::from(along)).normalize_or_zero();
         let part = |x: f64, ways: [&'static str; 2]| (x.abs() > LEAST).then(|| ways[usize::from(x > 0.0)]);
         let parts = [
             part(d.x, ["to the left", "to the right"]),
@@ -95,11 +95,11 @@ mod tests {
     }
 
     /// The front is defined by [`front_of`]; places are described, and pictures drawn, of models turned by
-    /// [`standing`].
+    /// [`turn_upright`].
     #[test]
     fn the_front_is_where_the_library_has_it() {
         for up in [Axis::X, Axis::Y, Axis::Z] {
-            let front = standing(up, Vec3::from(front_of(up.unit())));
+            let front = turn_upright(up, Vec3::from(front_of(up.unit())));
             assert_eq!(front + 0.0, Vec3::NEG_Y);
         }
     }

@@ -77,7 +77,7 @@ impl Printing {
         (!pieces.is_empty()).then(|| {
             Warning::new(
                 Cause::PieceTooLarge {
-                    printer: described(&self.printer),
+                    printer: describe(&self.printer),
                 },
                 pieces,
                 None,
@@ -100,7 +100,7 @@ impl Printing {
         let plates = if n == 1 { "plate" } else { "plates" };
         format!(
             "plates.3mf: {n} {plates} of {}{supports}{rest}",
-            described(&self.printer)
+            describe(&self.printer)
         )
     }
 
@@ -134,7 +134,7 @@ impl Printing {
         let n = self.plates.n_plates;
         let outer_mm2: f64 = self.plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let mut figures = vec![
-            ("printer".to_owned(), described(&self.printer)),
+            ("printer".to_owned(), describe(&self.printer)),
             ("plates".to_owned(), n.to_string()),
             ("all plates, about".to_owned(), self.cost.words()),
         ];
@@ -165,7 +165,7 @@ impl Printing {
             .poses
             .iter()
             .filter(|l| l.plate == plate)
-            .map(|l| (l.piece, as_laid(l, &pieces[l.piece])))
+            .map(|l| (l.piece, pose(l, &pieces[l.piece])))
             .collect();
         let bed = TriMesh {
             points: [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]]
@@ -238,7 +238,7 @@ impl Printing {
 }
 
 /// Piece in its pose on the plate, coarse enough for a picture.
-fn as_laid(laid: &Laid, piece: &TriMesh) -> TriMesh {
+fn pose(laid: &Laid, piece: &TriMesh) -> TriMesh {
     const SEEN_MM: f64 = 0.15;
     let coarse = decimate(piece.clone(), &vec![SEEN_MM; piece.points.len()]);
     TriMesh {
@@ -257,7 +257,7 @@ fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
 }
 
 /// Name and size of a printer, in words.
-pub fn described(printer: &Printer) -> String {
+pub fn describe(printer: &Printer) -> String {
     let [width, depth, height] = printer.bed_mm;
     format!("\"{}\" ({width} × {depth} × {height} mm)", printer.name)
 }

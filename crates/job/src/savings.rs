@@ -20,7 +20,7 @@ use shellock_print::{Printer, Process};
 
 use crate::failure::Failure;
 use crate::files::{Writing, write};
-use crate::kits::{Kit, model_of, pieces_of, plan_of};
+use crate::kits::{KitOnDisk, model_of, pieces_of, plan_of};
 use crate::printing::Printing;
 
 /// Name of the file within a kit.
@@ -90,7 +90,7 @@ pub struct SavedTime {
 /// if `closed_form`, even where a slicer is installed.
 pub fn savings(kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<Savings, Failure> {
     let plan = plan_of(kit)?;
-    let Kit { pieces, .. } = pieces_of(kit, &plan)?;
+    let KitOnDisk { pieces, .. } = pieces_of(kit, &plan)?;
     let solid = model_of(kit, &plan, model)?;
     let slicer = if closed_form { None } else { Slicer::find()? };
     let mut print_time = BTreeMap::new();
@@ -132,7 +132,7 @@ struct Costs {
     /// Cost of the whole model as people print it.
     whole: Cost,
     /// Cost of the whole model with 100 % infill, for filament.
-    filled: Option<Cost>,
+    full_infill: Option<Cost>,
     /// Reason why figures of the slicer are missing although it is installed.
     note: Option<String>,
 }
@@ -144,7 +144,7 @@ impl Costs {
             by: "closed form",
             pieces,
             whole: whole.unwrap_or_default(),
-            filled: None,
+            full_infill: None,
             note,
         }
     }
@@ -155,11 +155,11 @@ impl Costs {
             by,
             pieces,
             whole,
-            filled,
+            full_infill,
             note,
         } = self;
         let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
-        let filled_s = filled.map(|filled| filled.seconds);
+        let filled_s = full_infill.map(|filled| filled.seconds);
         SavedTime {
             by,
             filled_ratio: filled_s.map(|s| over(s, pieces.seconds)),
@@ -195,7 +195,7 @@ impl From<Failure> for NoEstimate {
 struct Slicer {
     folder: tempfile::TempDir,
     /// Keeps the program running until the folder is deleted.
-    _writing: Writing,
+    _guard: Writing,
 }
 
 impl Slicer {
@@ -211,7 +211,10 @@ impl Slicer {
         }
         let _writing = Writing::begin();
         let folder = tempfile::tempdir().map_err(Failure::unwritable(&std::env::temp_dir()))?;
-        Ok(Some(Self { folder, _writing }))
+        Ok(Some(Self {
+            folder,
+            _guard: _writing,
+        }))
     }
 
     /// Estimates the cost of all plates among `files`, and of the solid model.
@@ -252,7 +255,7 @@ impl Slicer {
             by: "PrusaSlicer",
             pieces,
             whole,
-            filled,
+            full_infill: filled,
             note,
         })
     }

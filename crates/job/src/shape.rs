@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     /// A hollow ball with a square hole of 4 mm underneath, labelled in two halves, at twice the file's size.
-    fn drained() -> Model {
+    fn ball_with_drain() -> Model {
         let [outer, inner] = [30.0, 27.0].map(|r| Volume::from_closed_mesh(&ball(4, Vec3::ZERO, r)).unwrap());
         let hole = brick([-2.0, 2.0], [-2.0, 2.0], [-40.0, 0.0]);
         let solid = Solid::new(outer.subtract(&inner).subtract(&hole).to_mesh()).unwrap();
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_filled_model_keeps_labels_and_faces_and_tells_of_it_in_both_units() {
-        let mut model = drained();
+        let mut model = ball_with_drain();
         let before = model.solid.clone();
         let hollow = find_hollow(&model.solid, LEAST_SHARE).unwrap();
         let filled = fill(&model.solid, &hollow).unwrap();

@@ -112,7 +112,7 @@ impl StressTest {
             "format": "shellock-stress", "version": 2, "punch_n": params.punch_n,
             "punch_at": params.punch_at, "drop_mm": params.drop_mm,
             "material": params.metric.material, "connector_size": params.sizes.largest_mm(),
-            "up": params.plan.up, "passed": tested.passed(), "report": tested,
+            "up": params.plan.up, "passed": tested.has_passed(), "report": tested,
         });
         let mut text = serde_json::to_string_pretty(&value).expect("numbers and strings can be written");
         text.push('\n');

@@ -101,7 +101,7 @@ pub fn before(printing: &Printing) -> Vec<Section> {
 }
 
 /// Section of the booklet that replaces it if the kit failed.
-pub fn failed() -> Section {
+pub fn failure_section() -> Section {
     Section {
         title: "Do not print this kit".into(),
         lines: vec![

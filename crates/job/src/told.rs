@@ -9,7 +9,7 @@ use shellock::strength::{Strength, StrengthParams};
 use crate::place::Standing;
 
 /// Lists what was tried, in order.
-pub fn tried(effort: &Effort) -> String {
+pub fn list_effort(effort: &Effort) -> String {
     let mut text = format!(
         "tried: {} keys, {} divisions, {} plans, {} kits",
         effort.keys, effort.segmentations, effort.plans, effort.kits

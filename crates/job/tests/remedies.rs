@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use shellock_job::options::declared;
+use shellock_job::options::declaration;
 
 /// Arguments of the program that are no options of a job.
 const OF_PROGRAM: [&str; 4] = ["force", "json", "out", "stop-with-stdin"];
@@ -37,7 +37,7 @@ fn every_option_that_a_message_names_exists() {
     for file in files {
         let text = fs::read_to_string(&file).unwrap();
         for name in named(&text) {
-            let is_known = declared(name).is_some() || OF_PROGRAM.contains(&name);
+            let is_known = declaration(name).is_some() || OF_PROGRAM.contains(&name);
             assert!(is_known, "{}: --{name}", file.display());
             n_named += 1;
         }
@@ -60,7 +60,7 @@ fn every_setting_that_a_warning_names_is_an_option() {
             .skip(1)
             .map(|rest| &rest[..rest.find("\"]").unwrap()]);
         for name in lists.flat_map(|list| list.split("\", \"")) {
-            assert!(declared(name).is_some(), "{}: {name}", file.display());
+            assert!(declaration(name).is_some(), "{}: {name}", file.display());
             n_named += 1;
         }
     }

@@ -28,7 +28,7 @@ mod run;
 
 pub use frame::{Curve, curves};
 pub use free::is_unobstructed;
-pub use profile::{Part, Section};
+pub use profile::{ProfileRect, Section};
 pub(crate) use rail::{rail_places, stop_mm};
 pub use run::{RailPart, Run, RunShape, RunStation, SeamRoom, runs};
 use shellock_plan::sizes::SizeChoice;

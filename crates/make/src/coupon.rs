@@ -144,7 +144,7 @@ impl Kind {
     }
 
     /// Directions on the plate of the x, y and z axes of the joint.
-    fn turned(self) -> [[f64; 3]; 3] {
+    fn axes(self) -> [[f64; 3]; 3] {
         match self {
             Self::Channel | Self::Rail => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             Self::Pin => [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
@@ -171,7 +171,7 @@ pub struct Part {
     /// One closed body, mm, in its place in the joint.
     pub mesh: TriMesh,
     /// Directions on the plate of the x, y and z axes of the joint.
-    pub turned: [[f64; 3]; 3],
+    pub axes: [[f64; 3]; 3],
     /// Shift of the part after that rotation, mm.
     pub moved_mm: [f64; 3],
 }
@@ -184,7 +184,7 @@ impl Part {
 
     /// Mesh of the part as it lies on the plate.
     pub fn on_plate(&self) -> TriMesh {
-        let [x, y, z] = self.turned.map(Vec3::from_array);
+        let [x, y, z] = self.axes.map(Vec3::from_array);
         let moved = Vec3::from_array(self.moved_mm);
         let placed = |p: &Vec3| p.x * x + p.y * y + p.z * z + moved;
         TriMesh {
@@ -256,7 +256,7 @@ fn parts(fit: &Fit, min_wall_mm: f64) -> Result<[Part; 4], NotPrintable> {
             kind,
             fit: *fit,
             mesh: printable_body(&volume)?,
-            turned: kind.turned(),
+            axes: kind.axes(),
             moved_mm: [0.0; 3],
         })
     });
@@ -285,7 +285,7 @@ fn grown([least, most]: [f64; 2], by_mm: f64) -> [f64; 2] {
 }
 
 /// Lowest coordinate of a section's parts, mm, at most 0; 0 is the wall's inner side.
-fn lowest<'a>(parts: impl IntoIterator<Item = &'a Option<crate::connector::Part>>) -> f64 {
+fn lowest<'a>(parts: impl IntoIterator<Item = &'a Option<crate::connector::ProfileRect>>) -> f64 {
     let heights = parts.into_iter().flatten().map(|part| part.s0);
     heights.fold(0.0, f64::min)
 }

@@ -108,7 +108,7 @@ fn lessons(n: usize, rng: &mut ChaCha8Rng) -> PlanConstraints {
             0 => constraints.weaken(p, q),
             1 => constraints.weak_joints.extend([(p, q, s)]),
             2 => constraints.forbidden.extend([(p, s)]),
-            _ => constraints.rubbed.extend([((p, q), 2)]),
+            _ => constraints.rubs.extend([((p, q), 2)]),
         }
     }
     constraints

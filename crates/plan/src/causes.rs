@@ -26,7 +26,7 @@ pub enum Cause {
     ConnectorsForUse {
         from_mm: f64,
         to_mm: f64,
-        done: String,
+        load: String,
     },
 }
 
@@ -71,11 +71,11 @@ impl Diagnostic for Cause {
                 )
                 .by(settings)
             }
-            Self::ConnectorsForUse { from_mm, to_mm, done } => Told::note(
+            Self::ConnectorsForUse { from_mm, to_mm, load } => Told::note(
                 "connectors-for-use",
                 format!(
                     "connectors between pieces {} and {} are {to_mm:.1} mm instead of {from_mm:.1} mm, so \
-                     that their seam stays closed when the kit is {done}",
+                     that their seam stays closed when the kit is {load}",
                     number(pieces, 0),
                     number(pieces, 1)
                 ),
@@ -142,7 +142,7 @@ mod tests {
             Cause::ConnectorsForUse {
                 from_mm: 2.0,
                 to_mm: 4.0,
-                done: "dropped onto its feet".into(),
+                load: "dropped onto its feet".into(),
             },
         ] {
             let sentence = cause.tell(&pieces).sentence;

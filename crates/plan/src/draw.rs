@@ -65,7 +65,7 @@ struct Draw<'a> {
     limits: DrawLimits,
     tries_left: usize,
     n_evaluations: usize,
-    removed: Vec<LatticeStep>,
+    removals: Vec<LatticeStep>,
     /// Directions of the removed pieces.
     separations: Vec<Option<LatticeDirection>>,
     joints: Vec<DirectedJoint>,
@@ -88,16 +88,16 @@ pub(super) fn draw(
         limits,
         tries_left: limits.max_tries,
         n_evaluations: 0,
-        removed: Vec::new(),
+        removals: Vec::new(),
         separations: vec![None; space.n],
         joints: Vec::new(),
         stuck: space.all(),
     };
     let found = draw.descend(space.all(), PieceSet::one(key.piece));
     let plan = found.then(|| {
-        draw.removed.reverse();
+        draw.removals.reverse();
         LatticePlan {
-            steps: std::mem::take(&mut draw.removed),
+            steps: std::mem::take(&mut draw.removals),
         }
     });
     Drawn {
@@ -124,16 +124,16 @@ impl Draw<'_> {
             let rest = left.minus(PieceSet::one(piece));
             let n_joints = self.joints.len();
             self.joints.extend(self.space.joints(piece, separation, rest));
-            self.removed.push(LatticeStep { piece, separation });
+            self.removals.push(LatticeStep { piece, separation });
             self.separations[usize::from(piece)] = Some(separation);
             // A part that is loose already, with the rest as one block, can never lock.
             let holds = loose_part_fused(self.space.n, &self.joints, self.key.piece, rest).is_none();
-            let attached = attached.union(self.space.joined(piece, separation, rest));
+            let attached = attached.union(self.space.joint_partners(piece, separation, rest));
             if holds && self.descend(rest, attached) {
                 return true;
             }
             self.joints.truncate(n_joints);
-            self.removed.pop();
+            self.removals.pop();
             self.separations[usize::from(piece)] = None;
         }
         if left.len() < self.stuck.len() {
@@ -151,11 +151,11 @@ impl Draw<'_> {
         if !attached.contains(piece) || !self.is_cheap(cost) {
             return false;
         }
-        self.removed.push(step);
-        let mut steps = self.removed.clone();
+        self.removals.push(step);
+        let mut steps = self.removals.clone();
         steps.reverse();
         if self.space.is_rejected(&LatticePlan { steps }) {
-            self.removed.pop();
+            self.removals.pop();
             return false;
         }
         true
@@ -164,7 +164,7 @@ impl Draw<'_> {
     /// Cost of the piece of `step` as it leaves `rest`.
     fn cost(&mut self, step: LatticeStep, rest: PieceSet) -> f64 {
         self.n_evaluations += 1;
-        let (role, around) = self.space.leaving(step, rest, &self.separations);
+        let (role, around) = self.space.departure(step, rest, &self.separations);
         self.space.costs.bound(step.piece, role, &around)
     }
 
@@ -181,12 +181,12 @@ impl Draw<'_> {
             if !rest.is_connected(&self.space.neighbours) {
                 continue;
             }
-            for separation in directions_in(self.space.allowed(piece)) {
+            for separation in directions_in(self.space.allowed_mask(piece)) {
                 let step = LatticeStep { piece, separation };
                 let is_allowed = !is_first || self.key.directions.contains(&separation);
                 if !is_allowed
                     || !self.space.is_free(piece, separation, rest)
-                    || self.space.joined(piece, separation, rest).is_empty()
+                    || self.space.joint_partners(piece, separation, rest).is_empty()
                 {
                     continue;
                 }

@@ -67,7 +67,7 @@ fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId)
             continue;
         }
         best.n_evaluations += 1;
-        let score = turned(space, &mut around, &costs, piece, s);
+        let score = score_along(space, &mut around, &costs, piece, s);
         if score.is_better_than(&best.score) {
             let mut other = from.clone();
             other.steps[at].separation = s;
@@ -82,7 +82,7 @@ fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId)
 
 /// Score of the plan if `piece` leaves along `s`. Only its own cost and those of its earlier neighbours
 /// differ from `costs`.
-fn turned(
+fn score_along(
     space: &Space<'_>,
     around: &mut [(Role, Surroundings)],
     costs: &IdVec<PatchId, f64>,

@@ -134,7 +134,7 @@ pub struct Surroundings {
     /// Seams of the piece, in the order of the survey's contacts.
     pub seams: Vec<SeamStates>,
     /// Pieces that certainly remain. Once everything is known, these are all that remain.
-    pub remaining: PieceSet,
+    pub remainder: PieceSet,
 }
 
 /// Cost function of pieces, given their surroundings. The cost of a plan is the bottleneck over all pieces.
@@ -217,7 +217,7 @@ struct PieceTable {
     length_mm: f64,
     inward: [f64; LatticeDirection::COUNT],
     /// For each direction, cost of each other piece that is in the way.
-    occluded: Vec<Vec<(PatchId, f64)>>,
+    occluder_costs: Vec<Vec<(PatchId, f64)>>,
 }
 
 /// The default cost of a piece: the mean over its seams, by length, of Eq. 4's weight and of the unusable
@@ -274,9 +274,9 @@ impl SeamCosts {
         }
         let mut sum = [0.0; N_PUSHES];
         for (seam, states) in self.pieces[usize::from(piece)].seams.iter().zip(&around.seams) {
-            match seam.only_held(role, *states) {
+            match seam.only_hold(role, *states) {
                 Some(held) => add(&mut sum, held),
-                None => add(&mut sum, &seam.most_held(role, *states)),
+                None => add(&mut sum, &seam.greatest_hold(role, *states)),
             }
         }
         f64::from(least(&sum))
@@ -331,7 +331,7 @@ impl SeamTable {
     }
 
     /// Hold of the only state left, without any comparison; `None` if several or none are left.
-    fn only_held(&self, role: Role, states: SeamStates) -> Option<&Hold> {
+    fn only_hold(&self, role: Role, states: SeamStates) -> Option<&Hold> {
         let own = role.separation().filter(|&s| states.own & mask_of(s) != 0);
         match (own, states.others) {
             (Some(s), 0) => Some(&self.hold[0][s.index()]),
@@ -342,7 +342,7 @@ impl SeamTable {
         }
     }
 
-    fn most_held(&self, role: Role, states: SeamStates) -> Hold {
+    fn greatest_hold(&self, role: Role, states: SeamStates) -> Hold {
         let mut most = self.most_of_others(states.others);
         if let Some(s) = role.separation().filter(|&s| states.own & mask_of(s) != 0) {
             raise(&mut most, &self.hold[0][s.index()]);
@@ -369,14 +369,14 @@ impl PieceTable {
             seams: Vec::new(),
             length_mm: 0.0,
             inward,
-            occluded,
+            occluder_costs: occluded,
         }
     }
 
     /// Cost of the way out of `remaining`.
     fn path_cost(&self, role: Role, remaining: PieceSet) -> f64 {
         let occluded = |s: LatticeDirection| {
-            let in_way = self.occluded[s.index()]
+            let in_way = self.occluder_costs[s.index()]
                 .iter()
                 .filter(|x| remaining.contains(x.0));
             in_way.map(|x| x.1).sum::<f64>()
@@ -397,7 +397,7 @@ impl PieceCosts for SeamCosts {
         let cost_mm: f64 = seams
             .map(|(seam, &states)| seam.least_cost_mm(role, states))
             .sum();
-        let path = table.path_cost(role, around.remaining);
+        let path = table.path_cost(role, around.remainder);
         cost_mm / table.length_mm + path + loose_cost(self.hold_mm3(piece, role, around))
     }
 
@@ -417,7 +417,7 @@ impl PieceCosts for SeamCosts {
             .collect();
         let mut left = vec![SeamStates::default(); around.seams.len()];
         for role in roles.iter() {
-            let path = table.path_cost(role, around.remaining);
+            let path = table.path_cost(role, around.remainder);
             let with_own =
                 |((t, &x), others): ((&SeamTable, &SeamStates), &(f64, Hold))| t.with_own(role, x, others.0);
             let least_mm: Vec<f64> = seams().zip(&of_others).map(with_own).collect();

@@ -29,7 +29,7 @@ pub struct PlanName(Relations);
 
 impl<'a> Neighbourhood<'a> {
     /// Creates the neighbourhood of `found`, with its key. `survey` must count joints as `found` did
-    /// ([`FoundPlan::counted`]).
+    /// ([`FoundPlan::apply_counts`]).
     pub fn new(
         params: &PlanParams,
         survey: &'a PlanSurvey,
@@ -51,7 +51,7 @@ impl<'a> Neighbourhood<'a> {
     }
 
     /// Returns the plan with its costs if it satisfies all conditions.
-    pub fn ranked(&self, plan: LatticePlan) -> Option<RankedPlan> {
+    pub fn rank(&self, plan: LatticePlan) -> Option<RankedPlan> {
         let score = self.space.score(&plan);
         if score.worst > just_above(self.most_cost) || !self.space.allows(&plan) {
             return None;
@@ -89,7 +89,7 @@ impl<'a> Neighbourhood<'a> {
         // The key stays last.
         if piece != plan.key() {
             for to in (0..plan.steps.len() - 1).filter(|to| *to != at) {
-                add(self.moved(plan, at, to));
+                add(self.move_step(plan, at, to));
             }
         }
         moves
@@ -103,7 +103,7 @@ impl<'a> Neighbourhood<'a> {
 
     /// Moves the step at `at` to `to`. The direction of a first piece has no meaning, so it is set straight
     /// outwards as in other plans. A piece that was first gets that direction, too.
-    fn moved(&self, plan: &LatticePlan, at: usize, to: usize) -> LatticePlan {
+    fn move_step(&self, plan: &LatticePlan, at: usize, to: usize) -> LatticePlan {
         let mut steps = plan.steps.clone();
         let step = steps.remove(at);
         steps.insert(to, step);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::LatticePlan;
-use super::score::{PlanScore, rounded};
+use super::score::{PlanScore, round_cost};
 use super::space::{Relations, Space};
 
 /// Greatest number of plans kept.
@@ -14,7 +14,7 @@ pub(super) const MOST_PLANS: usize = 100;
 pub(super) struct Pool {
     plans: Vec<(PlanScore, LatticePlan)>,
     /// Least cost met with each set of relations, whether the plan was kept or not.
-    seen: BTreeMap<Relations, f64>,
+    least_costs: BTreeMap<Relations, f64>,
 }
 
 impl Pool {
@@ -25,17 +25,17 @@ impl Pool {
     /// the joints.
     pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: LatticePlan) {
         let relations = space.relations(&plan);
-        match self.seen.get(&relations) {
-            Some(&least) if rounded(least) <= rounded(score.worst) => return,
+        match self.least_costs.get(&relations) {
+            Some(&least) if round_cost(least) <= round_cost(score.worst) => return,
             Some(_) => self
                 .plans
                 .retain(|(_, other)| space.relations(other) != relations),
             None => {}
         }
-        self.seen.insert(relations, score.worst);
+        self.least_costs.insert(relations, score.worst);
         // Among equal plans, the one met first stays in front. Keys are rounded so that ties are an
         // equivalence.
-        let key = |s: &PlanScore| (rounded(s.worst), s.mean);
+        let key = |s: &PlanScore| (round_cost(s.worst), s.mean);
         let rank = key(&score);
         let at = self.plans.partition_point(|(s, _)| {
             let other = key(s);

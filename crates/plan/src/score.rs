@@ -71,7 +71,7 @@ pub(super) fn just_above(cost: f64) -> f64 {
 
 /// Rounds `cost` to 30 binary digits, a step slightly finer than the rounding tolerance. Equality of rounded
 /// costs is an equivalence relation.
-pub(super) fn rounded(cost: f64) -> f64 {
+pub(super) fn round_cost(cost: f64) -> f64 {
     const DROPPED: u32 = 52 - 30;
     let half = 1 << (DROPPED - 1);
     f64::from_bits(cost.to_bits().wrapping_add(half) >> DROPPED << DROPPED)

@@ -312,7 +312,7 @@ fn draw_plans(
         }
         draws.n_batches += 1;
         draws.n_plans += plans.len();
-        add_improved(space, key, plans, pool);
+        improve_and_add(space, key, plans, pool);
         draws.n_stale = if pool.least_cost() < best_before {
             0
         } else {
@@ -333,7 +333,7 @@ fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Dr
 }
 
 /// Improves the cheapest plans of a batch, then adds all of them to `pool`.
-fn add_improved(
+fn improve_and_add(
     space: &Space<'_>,
     key: &KeyChoice,
     mut plans: Vec<(PlanScore, LatticePlan)>,

@@ -20,19 +20,19 @@ pub fn on_ctx<T>(run: impl FnOnce(&Ctx<'_>) -> T) -> T {
     run(&Ctx::quiet())
 }
 
-fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> PlanOutcome {
+fn run_search(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> PlanOutcome {
     on_ctx(|ctx| search(ctx, params, survey, constraints)).unwrap()
 }
 
 /// The plan that the search finds; `None` if there is none.
 fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> Option<LatticePlan> {
-    match searched(params, survey, constraints) {
+    match run_search(params, survey, constraints) {
         PlanOutcome::Found(found) => Some(found.plan),
         PlanOutcome::Infeasible { .. } => None,
     }
 }
 
-fn surveyed(surface: &shellock_surface::SegmentedSurface) -> PlanSurvey {
+fn run_survey(surface: &shellock_surface::SegmentedSurface) -> PlanSurvey {
     on_ctx(|ctx| {
         survey(
             ctx,
@@ -178,7 +178,7 @@ fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_all_keys_as_go
         let constraints = PlanConstraints::default();
         let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
         let keys = choices(&params, &survey);
-        match searched(&params, &survey, &constraints) {
+        match run_search(&params, &survey, &constraints) {
             PlanOutcome::Infeasible { .. } => {
                 assert_eq!(brute_force(&space, &keys), None, "round {round}");
                 n_none += 1;
@@ -214,7 +214,7 @@ fn where_one_piece_joins_two_parts_no_plan_locks() {
         let constraints = PlanConstraints::default();
         let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
         assert_eq!(brute_force(&space, &choices(&params, &survey)), None);
-        let PlanOutcome::Infeasible { articulations, .. } = searched(&params, &survey, &constraints) else {
+        let PlanOutcome::Infeasible { articulations, .. } = run_search(&params, &survey, &constraints) else {
             panic!("an articulation piece lets no plan lock")
         };
         assert_eq!(articulations, [PatchId(2)]);
@@ -223,13 +223,13 @@ fn where_one_piece_joins_two_parts_no_plan_locks() {
 
 #[test]
 fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
-    let survey = surveyed(&voronoi(sphere(5, Vec3::new(50.0, 55.0, 70.0)), 10, 1));
+    let survey = run_survey(&voronoi(sphere(5, Vec3::new(50.0, 55.0, 70.0)), 10, 1));
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| searched(&PlanParams::default(), &survey, &PlanConstraints::default()))
+        pool.install(|| run_search(&PlanParams::default(), &survey, &PlanConstraints::default()))
     };
     let PlanOutcome::Found(found) = on(1) else {
         panic!("ten cells of a ball have a plan")
@@ -255,7 +255,7 @@ fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
 
 #[test]
 fn what_earlier_rounds_forbid_is_kept_to() {
-    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams {
         n_plans: 40,
         ..PlanParams::default()
@@ -263,7 +263,7 @@ fn what_earlier_rounds_forbid_is_kept_to() {
     let mut constraints = PlanConstraints::default();
     for _ in 0..4 {
         let plan = plan_of(&params, &survey, &constraints).expect("enough is left");
-        assert!(!constraints.rejected.contains(&plan));
+        assert!(!constraints.rejections.contains(&plan));
         assert!(
             plan.steps[1..]
                 .iter()
@@ -272,7 +272,7 @@ fn what_earlier_rounds_forbid_is_kept_to() {
         constraints
             .forbidden
             .insert((plan.steps[3].piece, plan.steps[3].separation));
-        constraints.rejected.push(plan);
+        constraints.rejections.push(plan);
     }
     // If all contacts of one piece are weak, it joins nothing.
     survey
@@ -281,14 +281,14 @@ fn what_earlier_rounds_forbid_is_kept_to() {
         .filter(|c| c.a == PatchId(0))
         .for_each(|c| constraints.weaken(c.a, c.b));
     assert!(matches!(
-        searched(&params, &survey, &constraints),
+        run_search(&params, &survey, &constraints),
         PlanOutcome::Infeasible { .. }
     ));
 }
 
 #[test]
 fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
-    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams {
         n_plans: 40,
         ..PlanParams::default()
@@ -296,16 +296,16 @@ fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
     let mut constraints = PlanConstraints::default();
     let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
     let (earlier, later) = (plan.steps[2].piece, plan.steps[5].piece);
-    constraints.rubbed.insert((later, earlier), 1);
+    constraints.rubs.insert((later, earlier), 1);
     assert_eq!(plan_of(&params, &survey, &constraints), Some(plan));
-    constraints.rubbed.insert((later, earlier), 2);
+    constraints.rubs.insert((later, earlier), 2);
     let plan = plan_of(&params, &survey, &constraints).expect("enough is left");
     assert!(plan.position(later) < plan.position(earlier));
 }
 
 #[test]
 fn a_short_joint_counts_only_in_another_direction() {
-    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams {
         n_plans: 40,
         ..PlanParams::default()
@@ -324,7 +324,7 @@ fn a_short_joint_counts_only_in_another_direction() {
 #[test]
 fn who_is_blocked_all_round_is_named_with_the_place() {
     // No simple shape blocks a piece all round, so every direction of every piece is marked as blocked.
-    let mut survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 4, |p| {
+    let mut survey = run_survey(&label(sphere(4, Vec3::splat(50.0)), 4, |p| {
         u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0)
     }));
     for s in LatticeDirection::all() {
@@ -335,7 +335,7 @@ fn who_is_blocked_all_round_is_named_with_the_place() {
             survey.occlusion.block(p, q, s);
         }
     }
-    let outcome = searched(&PlanParams::default(), &survey, &PlanConstraints::default());
+    let outcome = run_search(&PlanParams::default(), &survey, &PlanConstraints::default());
     let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else {
         panic!("nothing can leave")
     };
@@ -344,25 +344,25 @@ fn who_is_blocked_all_round_is_named_with_the_place() {
 
 #[test]
 fn one_piece_and_too_many_are_refused_in_words() {
-    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 1, |_| 0));
+    let survey = run_survey(&label(sphere(2, Vec3::splat(50.0)), 1, |_| 0));
     assert!(matches!(
-        searched(&PlanParams::default(), &survey, &PlanConstraints::default()),
+        run_search(&PlanParams::default(), &survey, &PlanConstraints::default()),
         PlanOutcome::Infeasible { .. }
     ));
-    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 200, |_| 0));
-    let outcome = searched(&PlanParams::default(), &survey, &PlanConstraints::default());
+    let survey = run_survey(&label(sphere(2, Vec3::splat(50.0)), 200, |_| 0));
+    let outcome = run_search(&PlanParams::default(), &survey, &PlanConstraints::default());
     assert!(matches!(outcome, PlanOutcome::Infeasible { reason, .. } if reason.contains("200")));
 }
 
 #[test]
 fn a_key_that_is_no_piece_is_named_and_not_blamed_on_the_pieces() {
-    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
+    let survey = run_survey(&label(sphere(2, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
     for key in [2, u32::MAX - 1] {
         let params = PlanParams {
             key: Some(PatchId(key)),
             ..PlanParams::default()
         };
-        let outcome = searched(&params, &survey, &PlanConstraints::default());
+        let outcome = run_search(&params, &survey, &PlanConstraints::default());
         let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else {
             panic!("there is no piece {key}")
         };
@@ -376,7 +376,7 @@ fn a_key_that_is_no_piece_is_named_and_not_blamed_on_the_pieces() {
 
 #[test]
 fn two_hemispheres_have_a_plan() {
-    let survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
+    let survey = run_survey(&label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
     let constraints = PlanConstraints::default();
     let plan = plan_of(&PlanParams::default(), &survey, &constraints).expect("either leaves along the axis");
     let up = plan.separation(plan.key()).step()[2];
@@ -429,7 +429,7 @@ fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong(
 
 #[test]
 fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
-    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let constraints = PlanConstraints::default();
     let found = |proof_budget| {
         let params = PlanParams {
@@ -437,7 +437,7 @@ fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
             proof_budget,
             ..PlanParams::default()
         };
-        match searched(&params, &survey, &constraints) {
+        match run_search(&params, &survey, &constraints) {
             PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, .. } => panic!("{reason}"),
         }
@@ -461,14 +461,14 @@ impl PieceCosts for BoundsAlone {
 
 #[test]
 fn a_metric_that_gives_bounds_alone_finds_the_same_optimum() {
-    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 6, 2));
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 6, 2));
     let params = PlanParams {
         n_plans: 20,
         ..PlanParams::default()
     };
     let constraints = PlanConstraints::default();
     let make: MakeCosts<'_> = &|s, c| Box::new(BoundsAlone(SeamCosts::new(s, c)));
-    let plain = searched(&params, &survey, &constraints);
+    let plain = run_search(&params, &survey, &constraints);
     let other = on_ctx(|ctx| search_with(ctx, &params, &survey, &constraints, make)).unwrap();
     let (PlanOutcome::Found(plain), PlanOutcome::Found(other)) = (plain, other) else {
         panic!("a ball has a plan")
@@ -500,7 +500,7 @@ fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps
             .collect();
         let open = Surroundings {
             seams,
-            remaining: PieceSet::EMPTY,
+            remainder: PieceSet::EMPTY,
         };
         let choose = |(i, x): (usize, &SeamStates)| match directions_in(x.others).nth(i + 1) {
             Some(t) => SeamStates {
@@ -515,7 +515,7 @@ fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps
         let seams = open.seams.iter().enumerate().map(choose).collect();
         let chosen = Surroundings {
             seams,
-            remaining: PieceSet::first(4),
+            remainder: PieceSet::first(4),
         };
         let mut open = open;
         // If all other seams are decided, the limit leaves the last one no room at all.

@@ -262,12 +262,12 @@ pub struct ChosenSizes {
     /// The size of each pair.
     pub sizes: ConnectorSizes,
     /// Pairs whose size was reduced by more than a user would overlook, sorted.
-    pub limited: Vec<LimitedSize>,
+    pub reductions: Vec<LimitedSize>,
     /// Largest size that fits between each pair, mm, the lower id first, and a place of its seam; empty where
     /// the user gives the size.
     most: BTreeMap<[PatchId; 2], (f64, Vec3)>,
     /// Pairs whose connectors are larger than the stress asks for.
-    raised: Vec<RaisedSize>,
+    increases: Vec<RaisedSize>,
 }
 
 /// A pair whose connectors are larger than by Eq. 3, for the sake of use.
@@ -278,7 +278,7 @@ struct RaisedSize {
     from_mm: f64,
     to_mm: f64,
     /// Description of the use, as in "where it is …".
-    done: &'static str,
+    load: &'static str,
 }
 
 /// A pair whose connectors are smaller than by Eq. 3.
@@ -320,9 +320,9 @@ pub fn choose(
         SizeChoice::Fixed(size_mm) => {
             return Ok(ChosenSizes {
                 sizes: ConnectorSizes::uniform(*size_mm),
-                limited: Vec::new(),
+                reductions: Vec::new(),
                 most: BTreeMap::new(),
-                raised: Vec::new(),
+                increases: Vec::new(),
             });
         }
         SizeChoice::Auto(range) => range,
@@ -353,9 +353,9 @@ pub fn choose(
         .collect();
     Ok(ChosenSizes {
         sizes,
-        limited,
+        reductions: limited,
         most,
-        raised: Vec::new(),
+        increases: Vec::new(),
     })
 }
 
@@ -445,9 +445,9 @@ impl ChosenSizes {
         own.for_each(|(_, most)| most.0 = most.0.min(most_mm));
     }
 
-    /// Enlarges the connectors of a pair to the largest size that fits, for the use `done` to the kit.
+    /// Enlarges the connectors of a pair to the largest size that fits, for the use `load` to the kit.
     /// Returns true if they grew.
-    pub fn raise(&mut self, [a, b]: [PatchId; 2], done: &'static str) -> bool {
+    pub fn raise(&mut self, [a, b]: [PatchId; 2], load: &'static str) -> bool {
         /// Least growth that counts as a change, mm.
         const LEAST_MM: f64 = 0.05;
         let pair = [a.min(b), a.max(b)];
@@ -456,12 +456,12 @@ impl ChosenSizes {
             return false;
         };
         self.sizes.set(pair, to_mm);
-        self.raised.push(RaisedSize {
+        self.increases.push(RaisedSize {
             pair,
             at,
             from_mm,
             to_mm,
-            done,
+            load,
         });
         true
     }
@@ -470,19 +470,19 @@ impl ChosenSizes {
     /// Warns with `connector-limited` once for all seams that are too short, and once for all cavities that
     /// are too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
-        for raised in &self.raised {
+        for raised in &self.increases {
             ctx.warn(Warning::new(
                 Cause::ConnectorsForUse {
                     from_mm: raised.from_mm,
                     to_mm: raised.to_mm,
-                    done: raised.done.to_owned(),
+                    load: raised.load.to_owned(),
                 },
                 raised.pair.to_vec(),
                 Some(raised.at.to_array()),
             ));
         }
         for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
-            let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
+            let limited: Vec<&LimitedSize> = self.reductions.iter().filter(|l| l.limit == limit).collect();
             let lost_mm = |l: &LimitedSize| l.wanted_mm - l.given_mm;
             // Ties go to the pair with the lower ids.
             let worst = limited

@@ -68,7 +68,7 @@ impl<'a> Space<'a> {
             .map(|p| {
                 let rubs = |q| {
                     constraints
-                        .rubbed
+                        .rubs
                         .get(&(p, q))
                         .is_some_and(|&times| times >= MOST_RUBS)
                 };
@@ -118,7 +118,7 @@ impl<'a> Space<'a> {
     }
 
     /// Pieces of `rest` that `p` joins if it leaves them along `s`.
-    pub fn joined(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> PieceSet {
+    pub fn joint_partners(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> PieceSet {
         self.joins[usize::from(p)][s.index()].and(rest)
     }
 
@@ -129,11 +129,13 @@ impl<'a> Space<'a> {
         s: LatticeDirection,
         rest: PieceSet,
     ) -> impl Iterator<Item = DirectedJoint> {
-        self.joined(p, s, rest).iter().map(move |earlier| DirectedJoint {
-            later: p,
-            earlier,
-            separation: s,
-        })
+        self.joint_partners(p, s, rest)
+            .iter()
+            .map(move |earlier| DirectedJoint {
+                later: p,
+                earlier,
+                separation: s,
+            })
     }
 
     /// Returns true if `plan` satisfies every condition: paths are free; each piece joins an earlier and a
@@ -151,7 +153,7 @@ impl<'a> Space<'a> {
             if rest.is_empty() {
                 break;
             }
-            let joined = self.joined(step.piece, step.separation, rest);
+            let joined = self.joint_partners(step.piece, step.separation, rest);
             if joined.is_empty() || !self.is_free(step.piece, step.separation, rest) {
                 return false;
             }
@@ -164,7 +166,7 @@ impl<'a> Space<'a> {
     /// Returns true if an earlier round rejected a plan with the same relations.
     pub fn is_rejected(&self, plan: &LatticePlan) -> bool {
         let is_same = |r: &LatticePlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
-        self.constraints.rejected.iter().any(is_same)
+        self.constraints.rejections.iter().any(is_same)
     }
 
     /// Relations that distinguish `plan` from others.
@@ -222,7 +224,7 @@ impl<'a> Space<'a> {
         let mut found = vec![(Role::First, Surroundings::default()); self.n];
         for step in plan.removal() {
             rest = rest.minus(PieceSet::one(step.piece));
-            found[usize::from(step.piece)] = self.leaving(step, rest, &separations);
+            found[usize::from(step.piece)] = self.departure(step, rest, &separations);
             separations[usize::from(step.piece)] = Some(step.separation);
         }
         found
@@ -230,7 +232,7 @@ impl<'a> Space<'a> {
 
     /// Role and surroundings of the piece of `step` as it leaves `rest`. `separations` are the directions of
     /// the pieces removed before.
-    pub fn leaving(
+    pub fn departure(
         &self,
         step: LatticeStep,
         rest: PieceSet,
@@ -260,13 +262,13 @@ impl<'a> Space<'a> {
             role,
             Surroundings {
                 seams,
-                remaining: rest,
+                remainder: rest,
             },
         )
     }
 
     /// Directions that the constraints ever allow `p`, as bits.
-    pub fn allowed(&self, p: PatchId) -> u32 {
+    pub fn allowed_mask(&self, p: PatchId) -> u32 {
         let is_allowed = |s: &LatticeDirection| !self.constraints.forbidden.contains(&(p, *s));
         LatticeDirection::all()
             .filter(is_allowed)

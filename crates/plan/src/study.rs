@@ -42,7 +42,7 @@ impl Technique {
 
 /// Best cost after a given amount of work.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct CostSample {
     /// Number of piece costs that draws evaluated, plus number of plans that local optimisation evaluated.
     pub n_evaluations: usize,
     /// Number of plans drawn.
@@ -62,11 +62,11 @@ pub fn convergence(
     survey: &PlanSurvey,
     technique: Technique,
     n_evaluations: usize,
-) -> Result<Vec<Sample>, Cancelled> {
+) -> Result<Vec<CostSample>, Cancelled> {
     let constraints = PlanConstraints::default();
     let space = Space::new(survey, &constraints, params.occlusion_tolerance);
     for key in choices(params, survey) {
-        let mut samples: Vec<Sample> = Vec::new();
+        let mut samples: Vec<CostSample> = Vec::new();
         let (mut n_done, mut n_plans, mut best) = (0, 0, f64::INFINITY);
         let mut batch = 0;
         while n_done < n_evaluations && (n_plans > 0 || batch < MOST_EMPTY_BATCHES) {
@@ -78,7 +78,7 @@ pub fn convergence(
             let one = |i: usize| {
                 // The last of the spreads is uniform.
                 let drawn = draw(&space, &key, stream(params.seed, i), UNIFORM, limits);
-                let done = |plan: LatticePlan| finished(&space, &key, technique, plan);
+                let done = |plan: LatticePlan| finish(&space, &key, technique, plan);
                 (drawn.n_evaluations, drawn.plan.map(done))
             };
             let found: Vec<(usize, Option<(usize, PlanScore)>)> = (batch * BATCH..(batch + 1) * BATCH)
@@ -94,7 +94,7 @@ pub fn convergence(
                 n_plans += 1;
                 if score.worst < best {
                     best = score.worst;
-                    samples.push(Sample {
+                    samples.push(CostSample {
                         n_evaluations: n_done,
                         n_plans,
                         best_cost: best,
@@ -104,7 +104,7 @@ pub fn convergence(
             batch += 1;
         }
         if n_plans > 0 {
-            samples.push(Sample {
+            samples.push(CostSample {
                 n_evaluations: n_done,
                 n_plans,
                 best_cost: best,
@@ -122,7 +122,7 @@ const MOST_EMPTY_BATCHES: usize = 8;
 const UNIFORM: usize = 3;
 
 /// Score of a plan after local optimisation, if any, and number of plans evaluated for it.
-fn finished(
+fn finish(
     space: &Space<'_>,
     key: &super::key::KeyChoice,
     technique: Technique,

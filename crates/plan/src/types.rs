@@ -26,9 +26,9 @@ pub struct PlanConstraints {
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
     /// Number of times that a piece (first) rubbed against an earlier one (second). After two, along two
     /// directions, the first piece must be installed before the second.
-    pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
+    pub rubs: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason not covered by the fields above.
-    pub rejected: Vec<LatticePlan>,
+    pub rejections: Vec<LatticePlan>,
 }
 
 impl PlanConstraints {
@@ -37,11 +37,11 @@ impl PlanConstraints {
         let Self {
             weak_joints,
             forbidden,
-            rubbed,
-            rejected,
+            rubs: rubbed,
+            rejections,
         } = self;
         let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
-        weak_joints.len() + forbidden.len() + n_orders + rejected.len()
+        weak_joints.len() + forbidden.len() + n_orders + rejections.len()
     }
 
     /// Marks that `a` and `b` join nothing, whichever is later and along any direction.
@@ -143,7 +143,7 @@ pub struct PlanProof {
 
 impl FoundPlan {
     /// Returns a copy of `survey` in which joints count as they did when the plan was found.
-    pub fn counted(&self, survey: &PlanSurvey) -> PlanSurvey {
+    pub fn apply_counts(&self, survey: &PlanSurvey) -> PlanSurvey {
         let mut counted = survey.clone();
         counted
             .contacts

@@ -34,9 +34,9 @@ pub enum Cause {
     ComesApart,
     PieceLoose,
     BearsLittle {
-        done: String,
+        load: String,
         bears: String,
-        asked: String,
+        requirement: String,
         gives_way: String,
     },
 }
@@ -116,15 +116,15 @@ impl Diagnostic for Cause {
             )
             .by(&["pieces"]),
             Self::BearsLittle {
-                done,
+                load,
                 bears,
-                asked,
+                requirement,
                 gives_way,
             } => Told::warning(
                 "bears-little",
                 format!(
-                    "{done} the kit withstands {bears}, not {asked}: then {gives_way} between pieces {} and \
-                     {}; handle it with care there, print it larger, or make fewer pieces",
+                    "{load} the kit withstands {bears}, not {requirement}: then {gives_way} between \
+                     pieces {} and {}; handle it with care there, print it larger, or make fewer pieces",
                     number(pieces, 0),
                     number(pieces, 1)
                 ),
@@ -168,9 +168,9 @@ mod tests {
             Cause::ComesApart,
             Cause::PieceLoose,
             Cause::BearsLittle {
-                done: "dropped onto its feet".into(),
+                load: "dropped onto its feet".into(),
                 bears: "a fall from 45 cm".into(),
-                asked: "2.0 m".into(),
+                requirement: "2.0 m".into(),
                 gives_way: "pins bend".into(),
             },
         ] {

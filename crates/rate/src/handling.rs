@@ -138,7 +138,7 @@ impl Deed {
     }
 
     /// Description of the load, as in "where it is …".
-    pub fn done(&self) -> &'static str {
+    pub fn words(&self) -> &'static str {
         match self {
             Self::PressTop => "pressed on its top",
             Self::PressMiddle => "pressed on its middle",
@@ -167,7 +167,7 @@ pub struct LoadCase {
 
 /// All loads on `assembly`, except those that have no place on it.
 pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase> {
-    let bench = Bench::new(handling, assembly);
+    let bench = LoadSurface::new(handling, assembly);
     let up = Vec3::from_array(handling.up).normalize_or(Vec3::Z);
     let mut cases = Vec::new();
     cases.extend(bench.press(Deed::PressTop, up, bench.top(up)));
@@ -196,7 +196,7 @@ pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase
 /// The highest point of `assembly` that is wide enough to be pressed and above its feet; `None` if there is
 /// none.
 pub(crate) fn top(handling: &Handling, assembly: &ShellAssembly) -> Option<usize> {
-    Bench::new(handling, assembly).top(Vec3::from_array(handling.up).normalize_or(Vec3::Z))
+    LoadSurface::new(handling, assembly).top(Vec3::from_array(handling.up).normalize_or(Vec3::Z))
 }
 
 /// Directions as evenly spread as a few can be: a spiral of equal areas about `pole`.
@@ -211,7 +211,7 @@ fn even_directions(pole: Vec3, n: usize) -> impl Iterator<Item = Vec3> {
 }
 
 /// Properties of the surface that all loads need.
-struct Bench<'a> {
+struct LoadSurface<'a> {
     handling: &'a Handling,
     assembly: &'a ShellAssembly,
     mesh: TriMesh,
@@ -219,7 +219,7 @@ struct Bench<'a> {
     areas_mm2: Vec<f64>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> LoadSurface<'a> {
     fn new(handling: &'a Handling, assembly: &'a ShellAssembly) -> Self {
         let mesh = TriMesh {
             points: assembly.points.clone(),
@@ -243,7 +243,7 @@ impl<'a> Bench<'a> {
     /// The highest place that is wide enough to be pressed, above the feet: elsewhere the model would tip
     /// over.
     fn top(&self, up: Vec3) -> Option<usize> {
-        highest_of(self.assembly, up, self.pressed(up).into_iter())
+        highest_of(self.assembly, up, self.press_points(up).into_iter())
     }
 
     /// The pressable place nearest to the vertical line through the middle of the feet.
@@ -257,12 +257,12 @@ impl<'a> Bench<'a> {
                 .reject_from_normalized(up)
                 .length()
         };
-        self.pressed(up)
+        self.press_points(up)
             .into_iter()
             .min_by(|a, b| aside(*a).total_cmp(&aside(*b)))
     }
 
-    fn pressed(&self, up: Vec3) -> Vec<usize> {
+    fn press_points(&self, up: Vec3) -> Vec<usize> {
         /// Least cosine between the press and a surface that it does not slip off.
         const FACING: f64 = 0.5;
         let feet = lowest(self.assembly, up);
@@ -504,7 +504,7 @@ impl Borne {
 }
 
 /// Load factor of a plan under the load that `bearing` was solved for.
-pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
+pub fn load_factor(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
     let opened = Borne::ANY.opening(plan, &bearing.opening_mm);
     match robust_pin(plan, bearing) {
         Some((station, mpa)) => opened.and(strength_mpa / mpa, Failure::PinYields, station),

@@ -242,9 +242,9 @@ pub struct Strength {
     /// one betters by much, but at least 2 mm, or `most_mm` where that is less.
     pub is_too_weak: bool,
     /// All thicknesses tried, ascending, with the stress on the fine mesh as predicted from the coarse one.
-    pub tried: Vec<Tried>,
+    pub trials: Vec<Tried>,
     /// Decisive orientation: number of the fall, and the direction that is down in it.
-    pub deciding: (usize, Vec3),
+    pub decisive_fall: (usize, Vec3),
     /// Place of the decisive stress, mm.
     pub at: Vec3,
     /// Mesh on which stresses were computed.
@@ -261,8 +261,8 @@ pub struct Strength {
 
 impl Strength {
     /// Rotates the model, and all directions with it, by `turn`.
-    pub fn turned(mut self, turn: impl Fn(Vec3) -> Vec3) -> Self {
-        self.deciding.1 = turn(self.deciding.1);
+    pub fn rotate(mut self, turn: impl Fn(Vec3) -> Vec3) -> Self {
+        self.decisive_fall.1 = turn(self.decisive_fall.1);
         self.at = turn(self.at);
         self.mesh.points.iter_mut().for_each(|p| *p = turn(*p));
         self.solid
@@ -367,22 +367,22 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
         })?;
     let strength_mpa = params.material.strength_mpa;
     let middle_mm = (params.least_mm * params.most_mm).sqrt();
-    let mut tried = vec![coarse.worst(middle_mm)?.tried];
+    let mut tried = vec![coarse.worst(middle_mm)?.trial];
     let mut ratio = USUAL_RATIO;
     let mut exacts: Vec<Fallen> = Vec::new();
     for _ in 0..MOST_FINE {
         let estimate = estimate(ctx, params, &coarse, &mut tried, strength_mpa / ratio)?;
         if exacts
             .iter()
-            .any(|e| e.tried.thickness_mm == estimate.thickness_mm)
+            .any(|e| e.trial.thickness_mm == estimate.thickness_mm)
         {
             break;
         }
         let exact = fine.worst(estimate.thickness_mm)?;
         let before = ratio;
         // A wall without any load teaches nothing.
-        if exact.tried.stress_mpa > 0.0 && estimate.stress_mpa > 0.0 {
-            ratio = exact.tried.stress_mpa / estimate.stress_mpa;
+        if exact.trial.stress_mpa > 0.0 && estimate.stress_mpa > 0.0 {
+            ratio = exact.trial.stress_mpa / estimate.stress_mpa;
         }
         exacts.push(exact);
         if (ratio / before).ln().abs() <= RATIO_TOLERANCE {
@@ -391,13 +391,13 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     }
     // Where the ratio of the meshes varies with the thickness, the thinnest wall of sufficient strength
     // counts, else the last.
-    let bears = |e: &Fallen| e.tried.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
+    let bears = |e: &Fallen| e.trial.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
     let last = exacts.len() - 1;
     let thinnest = |i: &usize, j: &usize| {
         exacts[*i]
-            .tried
+            .trial
             .thickness_mm
-            .total_cmp(&exacts[*j].tried.thickness_mm)
+            .total_cmp(&exacts[*j].trial.thickness_mm)
     };
     let at = if bears(&exacts[last]) {
         last
@@ -431,7 +431,7 @@ fn estimate(
 ) -> Result<Tried, StrengthError> {
     while let Some(next_mm) = next(tried, params, limit_mpa).filter(|_| tried.len() < MOST_TRIED) {
         ctx.check()?;
-        insert(tried, coarse.worst(next_mm)?.tried);
+        insert(tried, coarse.worst(next_mm)?.trial);
     }
     ctx.check()?;
     let found = choice(tried, limit_mpa);
@@ -442,7 +442,7 @@ fn estimate(
     if let Some(known) = tried.iter().find(|t| t.thickness_mm == usual_mm) {
         return Ok(*known);
     }
-    let usual = coarse.worst(usual_mm)?.tried;
+    let usual = coarse.worst(usual_mm)?.trial;
     insert(tried, usual);
     Ok(usual)
 }
@@ -484,7 +484,7 @@ pub fn stress(
     ctx.stage("stress", 0)?;
     let shell = Falls::new(params, model, FINE_POINTS)?;
     let found = shell.worst(thickness_mm)?;
-    let tried = found.tried;
+    let tried = found.trial;
     Ok(shell.strength(
         found,
         tried.stress_mpa > params.material.strength_mpa,

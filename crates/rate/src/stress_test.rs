@@ -257,7 +257,7 @@ pub struct StressReport {
 
 impl StressReport {
     /// Returns true if the finished pieces hold in both tests, at every friction.
-    pub fn passed(&self) -> bool {
+    pub fn has_passed(&self) -> bool {
         self.printed
             .iter()
             .flat_map(|printed| [&printed.punch, &printed.drop])
@@ -337,7 +337,7 @@ impl TestSubject {
         plan: &InstallationPlan,
     ) -> Result<Self, StressError> {
         check(params, surface, plan)?;
-        let plan = laid(params, plan)?;
+        let plan = lattice_plan(params, plan)?;
         let mut params = params.clone();
         params.plan.up = params.turn.apply(Vec3::from(params.plan.up)).to_array();
         let mesh = params.turn.mesh(&surface.mesh);
@@ -353,7 +353,7 @@ impl TestSubject {
 }
 
 /// The plan with the directions of the rotated model.
-fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, StressError> {
+fn lattice_plan(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, StressError> {
     /// Greatest angle to a lattice direction, degrees, within which a direction counts as it.
     const MOST_OFF_DEG: f64 = 1.0;
     let step = |step: &InstallationStep| {
@@ -405,7 +405,7 @@ pub fn stress_test(
     ctx.stage("finished pieces", 0)?;
     let model = PlanModel::new(&params.metric, surface, &params.sizes);
     let meetings = model.meetings(plan);
-    let mut bench = printed::Bench::new(ctx, params, surface, &model, plan, &meetings, &pieces)?;
+    let mut bench = printed::TestRig::new(ctx, params, surface, &model, plan, &meetings, &pieces)?;
     let mut tested = Vec::new();
     for friction in FRICTION {
         ctx.stage(&format!("stress test with friction {friction}"), 0)?;

@@ -67,7 +67,7 @@ pub fn design(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
-    let params = &resolved(params, model, labels)?;
+    let params = &resolve_params(params, model, labels)?;
     let input = Input {
         params,
         model,
@@ -91,9 +91,9 @@ pub fn design(
 }
 
 /// Returns the parameters with the regions to keep whole as triangles of the model.
-fn resolved(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Params, DesignError> {
+fn resolve_params(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Params, DesignError> {
     Ok(Params {
-        keep_whole: segmentation::resolved(&params.keep_whole, model, labels)?,
+        keep_whole: segmentation::resolve_regions(&params.keep_whole, model, labels)?,
         ..params.clone()
     })
 }
@@ -214,7 +214,11 @@ impl Planned {
     fn new(
         turn: &Turn,
         surface: &SegmentedSurface,
-        Chosen { found, holding, .. }: Chosen,
+        Chosen {
+            search_result: found,
+            holding,
+            ..
+        }: Chosen,
         [of_plan, of_wall]: [Vec<Warning>; 2],
     ) -> Self {
         let (proof, mean_cost, n_plans) = (found.proof(), found.score.mean, found.pool.len());
@@ -225,7 +229,7 @@ impl Planned {
             proof: handover.proof(proof),
             mean_cost,
             n_plans,
-            holding: handover.holding(holding),
+            holding: handover.convert_holding(holding),
             warnings: [handover.warnings(of_plan), of_wall].concat(),
         }
     }
@@ -239,7 +243,7 @@ pub fn plan(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, NoPlan>, DesignError> {
-    let params = &resolved(params, model, labels)?;
+    let params = &resolve_params(params, model, labels)?;
     let input = Input {
         params,
         model,

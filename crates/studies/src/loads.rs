@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
-use shellock::handling::{Borne, Deed, Failure as Way, Handling, LoadCase, borne, load_cases};
+use shellock::handling::{Borne, Deed, Failure as Way, Handling, LoadCase, load_cases, load_factor};
 use shellock_mechanics::{Drift, Meeting};
 use shellock_volume::VolumeModel;
 use shellock_volume::compare::{borne_by_solids, volume_model};
@@ -133,7 +133,7 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
         steps as f64 / n
     );
     let row = |(i, case): (usize, &LoadCase)| {
-        let of = |(plan, bearings): (&Vec<Meeting>, &Vec<_>)| borne(plan, &bearings[i], strength_mpa);
+        let of = |(plan, bearings): (&Vec<Meeting>, &Vec<_>)| load_factor(plan, &bearings[i], strength_mpa);
         let found: Vec<_> = subject.meetings.iter().zip(&all).map(of).collect();
         Row {
             case: case.clone(),

@@ -82,7 +82,7 @@ fn thicknesses(ctx: &Ctx<'_>, params: &StrengthParams, solid: &Solid) -> Result<
             thickness_mm,
             stress_mpa,
             is_too_weak,
-            tried,
+            trials: tried,
             ..
         } = thickness(
             ctx,

@@ -57,7 +57,7 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
     let chosen =
         choose(&ctx, &choice, &foresight, found).map_err(|e| crate::metrics::failed("choice", &e))?;
     let steps = chosen
-        .found
+        .search_result
         .plan
         .steps
         .iter()

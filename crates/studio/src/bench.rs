@@ -14,11 +14,11 @@ use shellock::segmentation::{self, MOST_PIECES};
 use shellock::{Ctx, figure::Figure as Sample};
 use shellock_formats::{Loaded, write_stl_binary};
 use shellock_geom::Vec3;
-use shellock_job::bed::fitted;
-use shellock_job::build::checked;
+use shellock_job::bed::fit_params;
+use shellock_job::build::check_options;
 use shellock_job::input::{read, shellock_figure};
-use shellock_job::options::{Choice, Choices, Offer, changed, offers, relabelled};
-use shellock_job::output::lying;
+use shellock_job::options::{Choice, Choices, Offer, apply_changes, offers, relabel};
+use shellock_job::output::turn_back;
 use shellock_job::project::ModelOf;
 use shellock_job::{Failure, Options, Session, child, config};
 use shellock_print::Printer;
@@ -72,11 +72,11 @@ struct State {
     pieces: Option<Pieces>,
     /// Labels, one a face of the file, kept until the model is open.
     file_labels: Option<Vec<u32>>,
-    judged: Option<Arc<Judged>>,
+    judgement: Option<Arc<Judged>>,
     /// Flag that stops the running judgement.
-    judging: Arc<AtomicBool>,
+    stop_flag: Arc<AtomicBool>,
     /// Hash of the project that the kit in the making is built from.
-    making: Option<String>,
+    build_hash: Option<String>,
 }
 
 impl State {
@@ -85,7 +85,7 @@ impl State {
     ///
     /// Options name the labels of the model's file, or the numbers of painted pieces once a person has
     /// painted.
-    fn relabelled(&self, pieces: &Pieces) -> Option<Choices> {
+    fn relabel(&self, pieces: &Pieces) -> Option<Choices> {
         let model = &self.figure.as_ref()?.model;
         let own = model.labels.as_deref()?;
         let painted = self.pieces.as_ref().filter(|pieces| pieces.is_painted);
@@ -96,7 +96,7 @@ impl State {
         };
         let mesh = model.solid.mesh();
         let new_label = |label| successor(label, &before, &after, |face| mesh.face_area(face));
-        Some(relabelled(&self.choices, new_label))
+        Some(relabel(&self.choices, new_label))
     }
 }
 
@@ -118,7 +118,7 @@ impl Bench {
         });
         let printers = text.map(|text| config::printers_of(&text)).transpose();
         let printers = printers.map_err(Failure::Wrong)?.unwrap_or_default();
-        let options = chosen(&choices, &printers)?;
+        let options = choose_options(&choices, &printers)?;
         let state = State {
             revision: 0,
             model,
@@ -129,9 +129,9 @@ impl Bench {
             problem: None,
             pieces: None,
             file_labels: labels,
-            judged: None,
-            judging: Arc::default(),
-            making: None,
+            judgement: None,
+            stop_flag: Arc::default(),
+            build_hash: None,
         };
         Ok(Self {
             store,
@@ -159,7 +159,7 @@ impl Bench {
         let extension = path.extension().and_then(|e| e.to_str());
         // An unreadable file is reported when it is opened.
         let model = match shellock_formats::read_mesh(&bytes, extension) {
-            Ok(loaded) => self.kept(&name, &loaded, &bytes)?,
+            Ok(loaded) => self.store_model(&name, &loaded, &bytes)?,
             Err(_) => self.store.keep(&name, &bytes)?,
         };
         let mut state = self.lock();
@@ -171,7 +171,7 @@ impl Bench {
     }
 
     /// Stores a model's file, or a version of the same shape with triangles fine enough for painting.
-    fn kept(&self, name: &str, loaded: &Loaded, bytes: &[u8]) -> Result<ModelOf, Failure> {
+    fn store_model(&self, name: &str, loaded: &Loaded, bytes: &[u8]) -> Result<ModelOf, Failure> {
         match finer(name, loaded) {
             Some((name, bytes)) => self.store.keep(&name, &bytes),
             None => self.store.keep(name, bytes),
@@ -181,7 +181,7 @@ impl Bench {
     /// Opens a model from the project's folder.
     fn show(&self, model: ModelOf) -> Result<(), Refusal> {
         self.lock().is_opening = true;
-        let opened = self.opened(&model, &self.lock().options.clone());
+        let opened = self.read_figure(&model, &self.lock().options.clone());
         let mut state = self.lock();
         state.is_opening = false;
         let figure = opened?;
@@ -190,19 +190,19 @@ impl Bench {
         (state.problem, state.model) = (None, Some(model));
         state.figure = Some(Arc::new(figure));
         state.pieces = labels.map(Pieces::painted_by_hand);
-        self.changed(&mut state)
+        self.record_change(&mut state)
     }
 
-    fn opened(&self, model: &ModelOf, options: &Options) -> Result<Figure, Refusal> {
-        let path = self.store.model_path(model).map_err(|e| self.refused(&e))?;
-        Figure::open(&Session::silent(&Arc::default()), &path, options).map_err(|e| self.refused(&e))
+    fn read_figure(&self, model: &ModelOf, options: &Options) -> Result<Figure, Refusal> {
+        let path = self.store.model_path(model).map_err(|e| self.refuse(&e))?;
+        Figure::open(&Session::silent(&Arc::default()), &path, options).map_err(|e| self.refuse(&e))
     }
 
     /// Records a change: discards the judgement of the former state and saves the project.
-    fn changed(&self, state: &mut State) -> Result<(), Refusal> {
+    fn record_change(&self, state: &mut State) -> Result<(), Refusal> {
         state.revision += 1;
-        state.judged = None;
-        state.judging.store(true, Ordering::Relaxed);
+        state.judgement = None;
+        state.stop_flag.store(true, Ordering::Relaxed);
         let painted = state.pieces.as_ref().filter(|pieces| pieces.is_painted);
         let labels = state
             .figure
@@ -212,7 +212,7 @@ impl Bench {
         let saved = self
             .store
             .save(state.model.as_ref(), &state.choices, labels.as_deref());
-        saved.map_err(|e| self.refused(&e))
+        saved.map_err(|e| self.refuse(&e))
     }
 
     /// Sets new pieces for the state of `revision`; refuses if the state has changed since.
@@ -222,12 +222,12 @@ impl Bench {
             return Err(Refusal::overtaken());
         }
         let (n_pieces, notes, method) = (pieces.n(), pieces.notes.clone(), state.options.method.name());
-        if let Some(choices) = state.relabelled(&pieces) {
-            state.options = Arc::new(chosen(&choices, &self.printers)?);
+        if let Some(choices) = state.relabel(&pieces) {
+            state.options = Arc::new(choose_options(&choices, &self.printers)?);
             state.choices = choices;
         }
         state.pieces = Some(pieces);
-        self.changed(&mut state)?;
+        self.record_change(&mut state)?;
         Ok(Divided {
             revision: state.revision,
             n_pieces,
@@ -244,13 +244,13 @@ impl Bench {
         Ok(Snapshot {
             revision: state.revision,
             options: Arc::clone(&state.options),
-            figure: figure.ok_or_else(|| Refusal::missing("no model is open"))?,
+            figure: figure.ok_or_else(|| Refusal::not_found("no model is open"))?,
             pieces: state.pieces.clone(),
         })
     }
 
     /// Words a failure for the page, without the path of the project's folder.
-    fn refused(&self, failure: &Failure) -> Refusal {
+    fn refuse(&self, failure: &Failure) -> Refusal {
         let words = without_folder(&failure.to_string(), self.store.folder());
         match failure {
             Failure::Unwritable { .. } => Refusal::unable(words),
@@ -274,7 +274,7 @@ impl Snapshot {
     fn pieces(&self) -> Result<&Pieces, Refusal> {
         self.pieces
             .as_ref()
-            .ok_or_else(|| Refusal::missing("the model is not divided yet"))
+            .ok_or_else(|| Refusal::not_found("the model is not divided yet"))
     }
 }
 
@@ -295,7 +295,7 @@ impl Bench {
         let state = self.lock();
         let model = state.figure.as_ref().map(|figure| {
             let finer = state.model.as_ref().and_then(|of| finer::note(&of.file));
-            figure.told(finer, state.options.up)
+            figure.describe(finer, state.options.up)
         });
         let division = state.pieces.as_ref().map(|pieces| Division {
             n_pieces: pieces.n(),
@@ -313,7 +313,7 @@ impl Bench {
             model,
             division,
             kit: self.store.kit().map(|noted| MadeKit {
-                passed: noted.passed,
+                passed: noted.has_passed,
                 is_current: noted.is_current,
                 summary: noted.summary,
                 files: kit::list(&self.store.kit_folder()),
@@ -334,11 +334,11 @@ impl Bench {
             let state = self.lock();
             (state.choices.clone(), state.model.clone(), state.figure.clone())
         };
-        let choices = changed(&choices, changes)?;
-        let options = Arc::new(chosen(&choices, &self.printers)?);
+        let choices = apply_changes(&choices, changes)?;
+        let options = Arc::new(choose_options(&choices, &self.printers)?);
         let is_other = changes.keys().any(|name| OF_MODEL.contains(&&name[..]));
         let opened = match model.filter(|_| is_other && figure.is_some()) {
-            Some(model) => Some(self.opened(&model, &options)?),
+            Some(model) => Some(self.read_figure(&model, &options)?),
             None => None,
         };
         let mut state = self.lock();
@@ -347,7 +347,7 @@ impl Bench {
         if let Some(pieces) = &mut state.pieces
             && changes.keys().any(|name| name != "key")
         {
-            pieces.divided = None;
+            pieces.division = None;
         }
         if let Some(next) = opened {
             let painted = state.pieces.take().filter(|pieces| pieces.is_painted);
@@ -359,17 +359,19 @@ impl Bench {
                 .map(Pieces::painted_by_hand);
             state.figure = Some(Arc::new(next));
         }
-        self.changed(&mut state)
+        self.record_change(&mut state)
     }
 
     /// Opens the model in `file`, named `name`, and keeps a copy.
     pub(crate) fn open_file(&self, name: &str, file: &Path) -> Result<(), Refusal> {
-        let bytes = read(file).map_err(|e| self.refused(&e))?;
+        let bytes = read(file).map_err(|e| self.refuse(&e))?;
         // A file that cannot be read is not kept.
         let extension = Path::new(name).extension().and_then(|e| e.to_str());
         let loaded = shellock_formats::read_mesh(&bytes, extension)
             .map_err(|e| Refusal::wrong(format!("{name}: {e}")))?;
-        let model = self.kept(name, &loaded, &bytes).map_err(|e| self.refused(&e))?;
+        let model = self
+            .store_model(name, &loaded, &bytes)
+            .map_err(|e| self.refuse(&e))?;
         drop((bytes, loaded));
         let before = {
             let mut state = self.lock();
@@ -380,12 +382,12 @@ impl Bench {
 
     /// Opens one of the program's own figures.
     pub(crate) fn open_figure(&self, name: &str) -> Result<(), Refusal> {
-        let (solid, _) = shellock_figure(name, SAMPLE_MM).map_err(|e| self.refused(&e))?;
+        let (solid, _) = shellock_figure(name, SAMPLE_MM).map_err(|e| self.refuse(&e))?;
         let bytes = write_stl_binary(solid.mesh());
         let model = self
             .store
             .keep(&format!("{name}.stl"), &bytes)
-            .map_err(|e| self.refused(&e))?;
+            .map_err(|e| self.refuse(&e))?;
         self.lock().file_labels = None;
         self.show(model)
     }
@@ -399,7 +401,7 @@ impl Bench {
     /// Divides the model by the current options.
     pub(crate) fn divide(&self) -> Result<Divided, Refusal> {
         let of = self.snapshot()?;
-        let pieces = divided(&of).map_err(|e| self.refused(&e))?;
+        let pieces = divide_snapshot(&of).map_err(|e| self.refuse(&e))?;
         self.set_pieces(of.revision, pieces)
     }
 
@@ -452,27 +454,27 @@ impl Bench {
         let stop = Arc::new(AtomicBool::new(false));
         {
             let mut state = self.lock();
-            if let Some(judged) = state.judged.as_ref().filter(|_| state.revision == of.revision) {
-                return Ok(judged.told.clone());
+            if let Some(judged) = state.judgement.as_ref().filter(|_| state.revision == of.revision) {
+                return Ok(judged.judgement.clone());
             }
-            state.judging.store(true, Ordering::Relaxed);
-            state.judging = Arc::clone(&stop);
+            state.stop_flag.store(true, Ordering::Relaxed);
+            state.stop_flag = Arc::clone(&stop);
         }
         let judged = judge(&Session::silent(&stop), &of.figure, &of.options, pieces);
         let mut state = self.lock();
         if state.revision != of.revision || stop.load(Ordering::Relaxed) {
             return Err(Refusal::overtaken());
         }
-        let mut judged = judged.map_err(|e| self.refused(&e))?;
-        judged.told.revision = of.revision;
-        let told = judged.told.clone();
-        state.judged = Some(Arc::new(judged));
+        let mut judged = judged.map_err(|e| self.refuse(&e))?;
+        judged.judgement.revision = of.revision;
+        let told = judged.judgement.clone();
+        state.judgement = Some(Arc::new(judged));
         Ok(told)
     }
 
     /// Judged surface, cut along smooth seams, followed by the piece of each of its triangles.
     pub(crate) fn cut(&self) -> Result<Vec<u8>, Refusal> {
-        let judged = self.lock().judged.clone();
+        let judged = self.lock().judgement.clone();
         let cut = judged.map(|judged| judged.cut.clone());
         cut.ok_or_else(Refusal::overtaken)
     }
@@ -481,22 +483,22 @@ impl Bench {
     pub(crate) fn mend(&self) -> Result<Divided, Refusal> {
         let (revision, judged) = {
             let state = self.lock();
-            (state.revision, state.judged.clone())
+            (state.revision, state.judgement.clone())
         };
         let judged = match judged {
             Some(judged) => judged,
             None => {
                 self.judge()?;
-                self.lock().judged.clone().ok_or_else(Refusal::overtaken)?
+                self.lock().judgement.clone().ok_or_else(Refusal::overtaken)?
             }
         };
-        self.set_pieces(revision, Pieces::painted_by_hand(judged.mended.clone()))
+        self.set_pieces(revision, Pieces::painted_by_hand(judged.labels.clone()))
     }
 
     /// Divides both sides of a symmetric model alike.
     pub(crate) fn mirror(&self) -> Result<Divided, Refusal> {
         let of = self.snapshot()?;
-        let params = checked(&of.options).map_err(|e| self.refused(&e))?;
+        let params = check_options(&of.options).map_err(|e| self.refuse(&e))?;
         let params = Settings::resolve(&params).segmentation;
         let labels = segmentation::mirrored_labels(&params, &of.figure.model.solid, &of.pieces()?.labels);
         let labels =
@@ -506,7 +508,7 @@ impl Bench {
 
     /// Requests a key near the place `at`, mm.
     pub(crate) fn place_key(&self, at: [f64; 3]) -> Result<(), Refusal> {
-        let place = lying(self.snapshot()?.options.up, Vec3::from(at)) + 0.0;
+        let place = turn_back(self.snapshot()?.options.up, Vec3::from(at)) + 0.0;
         let [x, y, z] = place.to_array().map(|mm| format!("{mm:.2}"));
         let changes = Map::from_iter([("key".to_owned(), json!(format!("{x},{y},{z}")))]);
         self.choose(&changes)
@@ -516,7 +518,7 @@ impl Bench {
     pub(crate) fn can_make(&self) -> Result<(), Refusal> {
         match self.lock().figure {
             Some(_) => Ok(()),
-            None => Err(Refusal::missing("no model is open")),
+            None => Err(Refusal::not_found("no model is open")),
         }
     }
 }
@@ -524,7 +526,7 @@ impl Bench {
 impl Maker for Arc<Bench> {
     fn task(&self) -> Result<Command, Refusal> {
         self.can_make()?;
-        self.lock().making = Some(self.store.state());
+        self.lock().build_hash = Some(self.store.state());
         let program = std::env::current_exe().map_err(|e| Refusal::unable(e.to_string()))?;
         Ok(child::build(
             &program,
@@ -533,8 +535,8 @@ impl Maker for Arc<Bench> {
         ))
     }
 
-    fn ended(&self, code: Option<i32>, output: &str) {
-        let made_of = self.lock().making.take();
+    fn on_end(&self, code: Option<i32>, output: &str) {
+        let made_of = self.lock().build_hash.take();
         let result: Value = serde_json::from_str(output).unwrap_or_default();
         if let (Some(made_of), Some(code @ (0 | 1))) = (made_of, code) {
             // The kit exists even if the note on its inputs cannot be written.
@@ -547,10 +549,10 @@ impl Maker for Arc<Bench> {
 const OF_COMMAND: [&str; 3] = ["config", "out", "force"];
 
 /// Options that were chosen; refuses what `build` would refuse.
-fn chosen(choices: &[(String, Choice)], own_printers: &[Printer]) -> Result<Options, Failure> {
+fn choose_options(choices: &[(String, Choice)], own_printers: &[Printer]) -> Result<Options, Failure> {
     let mut of_kit = choices.to_vec();
     of_kit.retain(|(name, _)| !OF_COMMAND.contains(&&name[..]));
-    Options::chosen(&of_kit, own_printers)
+    Options::from_choices(&of_kit, own_printers)
 }
 
 /// `words` without the path of `folder` before the names of files in it, which ends in this system's
@@ -560,11 +562,11 @@ fn without_folder(words: &str, folder: &Path) -> String {
 }
 
 /// Divides the model as `segment` would.
-fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
+fn divide_snapshot(of: &Snapshot) -> Result<Pieces, Failure> {
     let stop = Arc::default();
     let session = Session::silent(&stop);
     let model = &of.figure.model;
-    let params = fitted(&session, &checked(&of.options)?, &of.options, model)?;
+    let params = fit_params(&session, &check_options(&of.options)?, &of.options, model)?;
     let notes: Mutex<Vec<String>> = Mutex::default();
     let report = |progress: shellock::Progress<'_>| {
         if let shellock::Progress::Note(text) = progress {
@@ -580,7 +582,7 @@ fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
     Ok(Pieces {
         labels: Arc::new(of.figure.labels_of(&surface)),
         is_painted: false,
-        divided: Some(Arc::new(surface)),
+        division: Some(Arc::new(surface)),
         notes: notes.into_inner().expect("no holder of this lock panics"),
     })
 }

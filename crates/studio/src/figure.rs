@@ -10,7 +10,7 @@ use shellock_geom::thin::thin_faces;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_job::input::{self, Model};
 use shellock_job::options::Axis;
-use shellock_job::output::standing;
+use shellock_job::output::turn_upright;
 use shellock_job::shape::{shape_warnings, wall_mm};
 use shellock_job::shares::largest_shares;
 use shellock_job::{Failure, Options, Session};
@@ -60,9 +60,9 @@ impl Figure {
     }
 
     /// Describes the model for the page; `finer` is a note on triangles that were divided.
-    pub fn told(&self, finer: Option<String>, up: Axis) -> messages::Model {
+    pub fn describe(&self, finer: Option<String>, up: Axis) -> messages::Model {
         let model = &self.model;
-        let size = standing(up, model.solid.mesh().bounds().size()).abs();
+        let size = turn_upright(up, model.solid.mesh().bounds().size()).abs();
         messages::Model {
             name: model.name.clone(),
             n_triangles: self.n_faces(),
@@ -96,7 +96,7 @@ impl Figure {
     /// Surface in the page's format: header, points (32-bit), corners, and a byte for each triangle that is 1
     /// if thin.
     pub fn bytes(&self, up: Axis) -> Vec<u8> {
-        shown(self.model.solid.mesh(), up, self.is_thin.iter().copied())
+        encode_upright(self.model.solid.mesh(), up, self.is_thin.iter().copied())
     }
 
     /// Patch with the largest share of each triangle that is shown.
@@ -138,11 +138,11 @@ impl Figure {
 }
 
 /// Turns a mesh upright and writes it in the page's format.
-pub fn shown(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> Vec<u8> {
+pub fn encode_upright(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> Vec<u8> {
     let n = [mesh.points.len(), mesh.triangles.len()].map(|n| n as u32);
     let header = [MAGIC, VERSION, n[0], n[1]];
     let mut bytes: Vec<u8> = header.iter().flat_map(|x| x.to_le_bytes()).collect();
-    let points = mesh.points.iter().flat_map(|&p| standing(up, p).to_array());
+    let points = mesh.points.iter().flat_map(|&p| turn_upright(up, p).to_array());
     bytes.extend(points.flat_map(|x| (x as f32).to_le_bytes()));
     bytes.extend(mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()));
     bytes.extend(is_thin.map(u8::from));

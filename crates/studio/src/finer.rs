@@ -41,7 +41,7 @@ pub fn finer(name: &str, loaded: &Loaded) -> Option<(String, Vec<u8>)> {
         return None;
     }
     let sound = repair(&loaded.mesh, RepairMode::Refuse).ok()?;
-    let (solid, source) = halved(sound.solid);
+    let (solid, source) = halve_long_edges(sound.solid);
     let labels = loaded.face_labels().map(|labels| {
         let of = |&face: &u32| i32::try_from(labels[sound.source_face[face as usize] as usize]);
         source.iter().map(of).collect::<Result<Vec<i32>, _>>()
@@ -68,7 +68,7 @@ fn is_coarse(loaded: &Loaded) -> bool {
 }
 
 /// Halves long edges until there are none or [`MANY`] triangles; also returns the original triangle of each.
-fn halved(mut solid: Solid) -> (Solid, Vec<u32>) {
+fn halve_long_edges(mut solid: Solid) -> (Solid, Vec<u32>) {
     let longest = LONGEST_SHARE * solid.mesh().bounds().size().length();
     let mut source: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
     while solid.mesh().triangles.len() < MANY {
@@ -90,19 +90,19 @@ mod tests {
     use shellock_formats::{read_mesh, write_stl_binary};
     use shellock_testkit::shapes::{as_written, cuboid, torus};
 
-    fn loaded(bytes: &[u8], extension: &str) -> Loaded {
+    fn load(bytes: &[u8], extension: &str) -> Loaded {
         read_mesh(bytes, Some(extension)).expect("it is a mesh")
     }
 
     #[test]
     fn a_box_of_twelve_triangles_can_be_painted_afterwards_and_is_the_same_box() {
-        let stl = loaded(
+        let stl = load(
             &write_stl_binary(&as_written(&cuboid([0.0; 3], [60.0, 40.0, 30.0]))),
             "stl",
         );
         let (name, bytes) = finer("box.stl", &stl).expect("its triangles are large");
         assert_eq!(name, "box-fine.ply");
-        let fine = loaded(&bytes, "ply");
+        let fine = load(&bytes, "ply");
         assert!(fine.mesh.triangles.len() > 5_000);
         assert!(!is_coarse(&fine), "once is enough");
         let solid = Solid::new(fine.mesh).expect("closed");
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_model_of_small_triangles_stays_as_it_is() {
-        let stl = loaded(&write_stl_binary(&torus(30.0, 10.0, [120, 60])), "stl");
+        let stl = load(&write_stl_binary(&torus(30.0, 10.0, [120, 60])), "stl");
         assert!(finer("ring.stl", &stl).is_none());
     }
 }

@@ -23,7 +23,7 @@ const MOST_EVENTS: usize = 256;
 /// Progress of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum State {
+pub enum JobState {
     Waiting,
     Running,
     /// A kit was made and passes all checks.
@@ -39,7 +39,7 @@ pub enum State {
 #[derive(Clone, Debug, Serialize)]
 pub struct Job {
     pub id: u64,
-    pub state: State,
+    pub state: JobState,
     /// Name of the current stage; its number, from 1, and the number of stages, both 0 while unknown.
     pub stage: String,
     pub number: usize,
@@ -62,7 +62,7 @@ impl Job {
     fn new(id: u64) -> Self {
         Self {
             id,
-            state: State::Waiting,
+            state: JobState::Waiting,
             stage: String::new(),
             number: 0,
             n_stages: 0,
@@ -78,16 +78,16 @@ impl Job {
 
     /// Marks the job as running, if it still waits.
     fn begin(&mut self) {
-        if self.state == State::Waiting {
-            (self.state, self.since) = (State::Running, Some(Instant::now()));
+        if self.state == JobState::Waiting {
+            (self.state, self.since) = (JobState::Running, Some(Instant::now()));
         }
     }
 
     fn is_over(&self) -> bool {
-        !matches!(self.state, State::Waiting | State::Running)
+        !matches!(self.state, JobState::Waiting | JobState::Running)
     }
 
-    fn told(&self) -> Self {
+    fn snapshot(&self) -> Self {
         let seconds = match self.since {
             Some(since) if !self.is_over() => since.elapsed().as_secs_f64(),
             _ => self.seconds,
@@ -137,7 +137,7 @@ pub trait Maker: Send + Sync + 'static {
     /// Returns the command that makes the next kit.
     fn task(&self) -> Result<Command, Refusal>;
     /// Takes notice of the end of a command: its exit code, `None` after a signal, and its standard output.
-    fn ended(&self, code: Option<i32>, output: &str);
+    fn on_end(&self, code: Option<i32>, output: &str);
 }
 
 /// All jobs of this server.
@@ -178,13 +178,13 @@ impl Jobs {
 
     /// Lists all jobs, the oldest first.
     pub fn list(&self) -> Vec<Job> {
-        self.lock().iter().map(Job::told).collect()
+        self.lock().iter().map(Job::snapshot).collect()
     }
 
     /// Adds a job for one more kit. Refused if too many jobs wait.
     pub fn add(&self) -> Result<Job, Refusal> {
         let mut all = self.lock();
-        if all.iter().filter(|job| job.state == State::Waiting).count() >= MOST_WAITING {
+        if all.iter().filter(|job| job.state == JobState::Waiting).count() >= MOST_WAITING {
             return Err(Refusal::too_many());
         }
         let job = Job::new(all.back().map_or(1, |last| last.id + 1));
@@ -202,12 +202,12 @@ impl Jobs {
     pub fn stop(&self, id: u64) -> Result<Job, Refusal> {
         self.change(id, |job| {
             if !job.is_over() {
-                job.seconds = job.told().seconds;
-                job.state = State::Stopped;
+                job.seconds = job.snapshot().seconds;
+                job.state = JobState::Stopped;
                 job.stop.store(true, Ordering::Relaxed);
             }
         })
-        .ok_or_else(|| Refusal::missing("there is no such job"))
+        .ok_or_else(|| Refusal::not_found("there is no such job"))
     }
 
     /// Stops all jobs, because the server ends.
@@ -223,7 +223,7 @@ impl Jobs {
             let next = self
                 .lock()
                 .iter()
-                .find(|job| job.state == State::Waiting)
+                .find(|job| job.state == JobState::Waiting)
                 .map(|job| job.id);
             match next {
                 Some(id) => self.run_one(id).await,
@@ -241,7 +241,7 @@ impl Jobs {
     /// Makes the kit of a job, if it still waits.
     fn make(&self, id: u64) {
         let begun = self.change(id, Job::begin);
-        let Some(job) = begun.filter(|job| job.state == State::Running) else {
+        let Some(job) = begun.filter(|job| job.state == JobState::Running) else {
             // The job was stopped before it began.
             return;
         };
@@ -255,14 +255,14 @@ impl Jobs {
         });
         match ended {
             Ok(ended) => {
-                self.maker.ended(ended.code, &ended.output);
+                self.maker.on_end(ended.code, &ended.output);
                 self.change(id, |job| job.end(&ended));
                 self.tell_project();
             }
             Err(refusal) => {
                 self.change(id, |job| {
-                    if job.state == State::Running {
-                        (job.state, job.error) = (State::Error, Some(refusal.to_string()));
+                    if job.state == JobState::Running {
+                        (job.state, job.error) = (JobState::Error, Some(refusal.to_string()));
                     }
                 });
             }
@@ -272,14 +272,14 @@ impl Jobs {
     fn change(&self, id: u64, change: impl FnOnce(&mut Job)) -> Option<Job> {
         let changed = self.lock().iter_mut().find(|job| job.id == id).map(|job| {
             change(job);
-            job.told()
+            job.snapshot()
         });
         self.tell(id);
         changed
     }
 
     fn tell(&self, id: u64) {
-        let job = self.lock().iter().find(|job| job.id == id).map(Job::told);
+        let job = self.lock().iter().find(|job| job.id == id).map(Job::snapshot);
         if let Some(job) = job {
             // Sending fails if no page listens, which is no error.
             let _ = self.events.send(Event::Job(Box::new(job)));
@@ -294,16 +294,16 @@ impl Jobs {
 impl Job {
     /// Records the end of the process.
     fn end(&mut self, ended: &Ended) {
-        if self.state == State::Running {
-            self.seconds = self.told().seconds;
+        if self.state == JobState::Running {
+            self.seconds = self.snapshot().seconds;
             self.state = match ended.code {
-                Some(0) => State::Verified,
-                Some(1) => State::Failed,
-                _ => State::Error,
+                Some(0) => JobState::Verified,
+                Some(1) => JobState::Failed,
+                _ => JobState::Error,
             };
         }
         (self.exit_code, self.seconds_left) = (ended.code, None);
-        if self.state == State::Error {
+        if self.state == JobState::Error {
             let told = serde_json::from_str::<Value>(&ended.output).ok();
             let told = told.and_then(|value| value["error"].as_str().map(str::to_owned));
             let words = || match ended.errors.join("\n").trim() {
@@ -338,7 +338,7 @@ mod tests {
     fn how_a_job_ended_is_told_by_its_code_and_its_own_words() {
         let ended = |code, output: &str, errors: &str| {
             let mut job = Job::new(1);
-            job.state = State::Running;
+            job.state = JobState::Running;
             let (output, errors) = (output.to_owned(), vec![errors.to_owned()]);
             job.end(&Ended {
                 code,
@@ -348,21 +348,21 @@ mod tests {
             });
             job
         };
-        assert_eq!(ended(Some(0), "{}", "").state, State::Verified);
-        assert_eq!(ended(Some(1), "{}", "").state, State::Failed);
+        assert_eq!(ended(Some(0), "{}", "").state, JobState::Verified);
+        assert_eq!(ended(Some(1), "{}", "").state, JobState::Failed);
         let wrong = ended(Some(2), r#"{"error":"too thin"}"#, "");
         assert_eq!(
             (wrong.state, wrong.error.as_deref()),
-            (State::Error, Some("too thin"))
+            (JobState::Error, Some("too thin"))
         );
         assert_eq!(ended(None, "", "killed").error.as_deref(), Some("killed"));
         let mut stopped = Job::new(1);
-        stopped.state = State::Stopped;
+        stopped.state = JobState::Stopped;
         stopped.end(&Ended {
             code: Some(130),
             ..Ended::default()
         });
-        assert_eq!((stopped.state, stopped.error), (State::Stopped, None));
+        assert_eq!((stopped.state, stopped.error), (JobState::Stopped, None));
     }
 
     /// Stands in for kits: shell scripts, one after the other.
@@ -378,12 +378,12 @@ mod tests {
             Ok(command)
         }
 
-        fn ended(&self, _: Option<i32>, _: &str) {}
+        fn on_end(&self, _: Option<i32>, _: &str) {}
     }
 
     /// Waits until the job is in none of these states, and returns it.
     #[cfg(unix)]
-    async fn left(jobs: &Jobs, id: u64, states: &[State]) -> Job {
+    async fn wait_past(jobs: &Jobs, id: u64, states: &[JobState]) -> Job {
         loop {
             let job = jobs.list().into_iter().find(|job| job.id == id).unwrap();
             if !states.contains(&job.state) {
@@ -402,12 +402,12 @@ mod tests {
             let jobs = Jobs::with_time_to_stop(scripts, Duration::from_millis(200));
             let ids = [(); 2].map(|()| jobs.add().unwrap().id);
             let running = tokio::spawn(Arc::clone(&jobs).run());
-            left(&jobs, ids[0], &[State::Waiting]).await;
+            wait_past(&jobs, ids[0], &[JobState::Waiting]).await;
             jobs.stop(ids[0]).unwrap();
-            let next = left(&jobs, ids[1], &[State::Waiting, State::Running]);
+            let next = wait_past(&jobs, ids[1], &[JobState::Waiting, JobState::Running]);
             let next = tokio::time::timeout(Duration::from_secs(10), next).await;
-            assert_eq!(next.expect("it runs").state, State::Failed, "{stuck}");
-            assert_eq!(jobs.list()[0].state, State::Stopped);
+            assert_eq!(next.expect("it runs").state, JobState::Failed, "{stuck}");
+            assert_eq!(jobs.list()[0].state, JobState::Stopped);
             running.abort();
         }
     }
@@ -421,7 +421,7 @@ mod tests {
         let jobs = Jobs::new(scripts);
         let id = jobs.add().unwrap().id;
         let running = tokio::spawn(Arc::clone(&jobs).run());
-        left(&jobs, id, &[State::Waiting]).await;
+        wait_past(&jobs, id, &[JobState::Waiting]).await;
         jobs.stop(id).unwrap();
         let ended = async {
             while jobs.list()[0].exit_code.is_none() {
@@ -431,7 +431,7 @@ mod tests {
         let ended = tokio::time::timeout(Duration::from_secs(10), ended).await;
         ended.expect("it ends with its standard input");
         let job = &jobs.list()[0];
-        assert_eq!((job.state, job.exit_code), (State::Stopped, Some(130)));
+        assert_eq!((job.state, job.exit_code), (JobState::Stopped, Some(130)));
         assert_eq!(job.notes, ["tidied up"]);
         running.abort();
     }

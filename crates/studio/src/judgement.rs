@@ -6,16 +6,16 @@ use shellock::key::KeySite;
 use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, PatchId, SegmentedSurface, Severity, Warning, plan};
 use shellock_geom::{TriMesh, Vec3};
-use shellock_job::bed::{fitted, shell_of};
-use shellock_job::build::checked;
+use shellock_job::bed::{fit_params, shell_of};
+use shellock_job::build::check_options;
 use shellock_job::options::Axis;
-use shellock_job::output::standing;
+use shellock_job::output::turn_upright;
 use shellock_job::place::Standing;
 use shellock_job::{Failure, Options, Session};
 use shellock_print::plates::{fits, fits_whole};
 
 use crate::advice;
-use crate::figure::{Figure, shown};
+use crate::figure::{Figure, encode_upright};
 use crate::messages::{Advice, Blocker, Judgement, Key, ToldPiece};
 use crate::pieces::Pieces;
 
@@ -25,9 +25,9 @@ const OFF_MM: f64 = 0.6;
 /// Result of a judgement.
 pub struct Judged {
     /// Judgement for the page.
-    pub told: Judgement,
+    pub judgement: Judgement,
     /// Labels after mending, one for each triangle that is shown.
-    pub mended: Vec<u32>,
+    pub labels: Vec<u32>,
     /// Surface cut along its seams, with the page's label of each of its triangles.
     pub cut: Vec<u8>,
 }
@@ -45,10 +45,10 @@ pub fn judge(
         .is_painted
         .then(|| labels_shown.iter().map(|&l| i64::from(l) + 1).collect());
     let labels = given.as_deref().or(model.labels.as_deref());
-    let checked = checked(options)?;
+    let checked = check_options(options)?;
     // Painted labels determine the number of pieces.
     let params = if labels.is_none() {
-        fitted(session, &checked, options, model)?
+        fit_params(session, &checked, options, model)?
     } else {
         checked
     };
@@ -59,19 +59,19 @@ pub fn judge(
         &params,
         &model.solid,
         labels,
-        pieces.divided.as_deref().cloned(),
+        pieces.division.as_deref().cloned(),
     )?;
     let view = View {
         up: options.up,
-        standing: Standing::of(options.up, model.solid.mesh()),
-        shown: labels_shown,
+        upright: Standing::of(options.up, model.solid.mesh()),
+        labels: labels_shown,
     };
-    let mended = figure.labels_of(&outlook.divided);
+    let mended = figure.labels_of(&outlook.division);
     let chosen = match &outlook.verdict {
         Verdict::Locks { key, .. } => *key,
         Verdict::Blocked { .. } => None,
     };
-    let labels_of = view.labels(&outlook.divided);
+    let labels_of = view.labels(&outlook.division);
     let warnings = outlook.warnings.iter();
     let mut advice: Vec<Advice> = warnings.map(|w| view.advice(w, &labels_of)).collect();
     let pieces = told_pieces(figure, options, &view, &mut advice)?;
@@ -79,32 +79,36 @@ pub fn judge(
         is_mended: advice.iter().any(|advice| advice.mends),
         advice,
         pieces,
-        n_pieces: outlook.divided.n_patches,
-        seams: view.seams(&outlook.divided),
+        n_pieces: outlook.division.n_patches,
+        seams: view.seams(&outlook.division),
         keys: view.keys(&outlook.keys, chosen),
         ..view.verdict(&outlook.verdict)
     };
-    let cut = view.cut(&outlook.divided);
-    Ok(Judged { told, mended, cut })
+    let cut = view.cut(&outlook.division);
+    Ok(Judged {
+        judgement: told,
+        labels: mended,
+        cut,
+    })
 }
 
 /// Translates places and pieces for the page: upright, and by the labels that it shows.
 struct View<'a> {
     up: Axis,
-    standing: Standing,
-    shown: &'a [u32],
+    upright: Standing,
+    labels: &'a [u32],
 }
 
 impl View<'_> {
     fn at(&self, place: [f64; 3]) -> [f64; 3] {
-        standing(self.up, Vec3::from(place)).to_array()
+        turn_upright(self.up, Vec3::from(place)).to_array()
     }
 
     /// Label of the page with the largest share of each patch.
     fn labels(&self, surface: &SegmentedSurface) -> Vec<u32> {
         let mut areas = vec![std::collections::BTreeMap::<u32, f64>::new(); surface.n_patches];
         for (face, &source) in surface.source_face.iter().enumerate() {
-            let label = self.shown[source as usize];
+            let label = self.labels[source as usize];
             *areas[usize::from(surface.patch_of_face[face])]
                 .entry(label)
                 .or_default() += surface.mesh.face_area(face);
@@ -117,7 +121,7 @@ impl View<'_> {
 
     fn cut(&self, surface: &SegmentedSurface) -> Vec<u8> {
         let labels = self.labels(surface);
-        let mut bytes = shown(
+        let mut bytes = encode_upright(
             &surface.mesh,
             self.up,
             surface.patch_of_face.iter().map(|_| false),
@@ -140,7 +144,7 @@ impl View<'_> {
                 let order: Vec<u32> = plan.steps.iter().map(|s| labels[usize::from(s.piece)]).collect();
                 let ways = plan.steps.iter().map(|s| -s.separation.unit());
                 let key = match key {
-                    Some(site) => format!("cut {}", self.standing.words(site.prism.middle().to_array())),
+                    Some(site) => format!("cut {}", self.upright.words(site.prism.middle().to_array())),
                     None => format!("piece {}", order.last().map_or(0, |label| label + 1)),
                 };
                 Judgement {
@@ -169,7 +173,7 @@ impl View<'_> {
     fn blocker(&self, blocker: &plan::Blocker, labels: &[u32]) -> Blocker {
         let number = |p: PatchId| labels.get(usize::from(p)).map_or(0, |label| label + 1);
         let (piece, by) = (number(blocker.piece), number(blocker.by));
-        let (place, share) = (self.standing.words(blocker.at), 100.0 * blocker.occluded);
+        let (place, share) = (self.upright.words(blocker.at), 100.0 * blocker.occluded);
         Blocker {
             piece,
             by,
@@ -194,7 +198,7 @@ impl View<'_> {
     fn seams(&self, surface: &SegmentedSurface) -> Vec<Vec<f64>> {
         let rounded = |x: f64| f64::from((100.0 * x).round() as f32 / 100.0);
         let line = |points: &[Vec3]| {
-            let standing = points.iter().flat_map(|&p| standing(self.up, p).to_array());
+            let standing = points.iter().flat_map(|&p| turn_upright(self.up, p).to_array());
             standing.map(rounded).collect()
         };
         surface.seams().iter().map(|seam| line(&seam.points)).collect()
@@ -218,10 +222,10 @@ impl View<'_> {
         let length = prism.length_mm();
         let outline =
             [(0.0, -1.0), (0.0, 1.0), (length, 1.0), (length, -1.0)].map(|(along, side)| corner(along, side));
-        let place = self.standing.words(prism.middle().to_array());
+        let place = self.upright.words(prism.middle().to_array());
         let words = format!(
             "{place}: slides out {}; {:.1} cm², rails of {:.0} mm, {:.0} % flat",
-            self.standing.way(prism.slide.to_array()),
+            self.upright.way(prism.slide.to_array()),
             site.area_mm2 / 100.0,
             site.rail_mm,
             100.0 * site.flat_share
@@ -249,15 +253,15 @@ fn told_pieces(
 ) -> Result<Vec<ToldPiece>, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let mesh = figure.model.solid.mesh();
-    let surface = as_shown(mesh, view.shown);
-    let neighbours = neighbours(mesh, view.shown, surface.n_patches);
+    let surface = display_surface(mesh, view.labels);
+    let neighbours = neighbours(mesh, view.labels, surface.n_patches);
     let is_small = fits_whole(&printer, mesh.bounds());
-    let params = checked(options)?;
+    let params = check_options(options)?;
     let wall_mm = shellock::design::Settings::resolve(&params).body.thickness_mm;
     let mut told = Vec::new();
     for piece in 0..surface.n_patches as u32 {
         let faces: Vec<usize> = (0..mesh.triangles.len())
-            .filter(|&f| view.shown[f] == piece)
+            .filter(|&f| view.labels[f] == piece)
             .collect();
         if faces.is_empty() {
             continue;
@@ -300,7 +304,7 @@ fn told_pieces(
 }
 
 /// Pieces as shown, with jagged seams along the triangles.
-fn as_shown(mesh: &TriMesh, shown: &[u32]) -> SegmentedSurface {
+fn display_surface(mesh: &TriMesh, shown: &[u32]) -> SegmentedSurface {
     SegmentedSurface {
         mesh: mesh.clone(),
         patch_of_face: shown.iter().map(|&label| PatchId(label)).collect(),
@@ -350,13 +354,13 @@ fn neighbours(mesh: &TriMesh, shown: &[u32], n: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_job::output::lying;
+    use shellock_job::output::turn_back;
 
     #[test]
     fn lying_is_where_it_was_before_it_stood() {
         let v = Vec3::new(1.0, 2.0, 3.0);
         for up in [Axis::X, Axis::Y, Axis::Z] {
-            assert_eq!(lying(up, standing(up, v)), v);
+            assert_eq!(turn_back(up, turn_upright(up, v)), v);
         }
     }
 }

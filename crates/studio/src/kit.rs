@@ -43,7 +43,7 @@ pub fn list(folder: &Path) -> Vec<KitFile> {
 
 /// Resolves `name` to a file within `folder`. Rejects names and links that lead out of it.
 pub fn file(folder: &Path, name: &str) -> Result<PathBuf, Refusal> {
-    let none = || Refusal::missing("there is no such file in the kit");
+    let none = || Refusal::not_found("there is no such file in the kit");
     let is_plain = Path::new(name)
         .components()
         .all(|part| matches!(part, Component::Normal(_)));
@@ -76,12 +76,12 @@ pub fn kind(name: &str) -> &'static str {
 pub fn archive(folder: &Path) -> Result<Vec<u8>, Refusal> {
     let names = names(folder);
     if names.is_empty() {
-        return Err(Refusal::missing("there is no kit yet"));
+        return Err(Refusal::not_found("there is no kit yet"));
     }
-    packed(folder, &names).map_err(|e| Refusal::unable(format!("the kit could not be packed: {e}")))
+    pack(folder, &names).map_err(|e| Refusal::unable(format!("the kit could not be packed: {e}")))
 }
 
-fn packed(folder: &Path, names: &[String]) -> Result<Vec<u8>, std::io::Error> {
+fn pack(folder: &Path, names: &[String]) -> Result<Vec<u8>, std::io::Error> {
     /// Meshes in 3MF files and pictures are compressed already, so more effort gains little.
     const LEVEL: i64 = 3;
     let options = SimpleFileOptions::default()

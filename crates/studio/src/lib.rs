@@ -80,7 +80,7 @@ pub fn serve(
         ready(&address);
         tokio::select! {
             ended = axum::serve(listener, app) => ended,
-            () = stopped(stop) => Ok(()),
+            () = wait_for_stop(stop) => Ok(()),
         }
     });
     jobs.close();
@@ -89,7 +89,7 @@ pub fn serve(
     ended
 }
 
-async fn stopped(stop: &AtomicBool) {
+async fn wait_for_stop(stop: &AtomicBool) {
     while !stop.load(Ordering::Relaxed) {
         tokio::time::sleep(LOOK).await;
     }

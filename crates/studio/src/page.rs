@@ -29,6 +29,6 @@ pub async fn index() -> Response {
 pub async fn file(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|f| f.0 == name) {
         Some((_, kind, text)) => ([(header::CONTENT_TYPE, *kind)], *text).into_response(),
-        None => Refusal::missing("there is no such page").into_response(),
+        None => Refusal::not_found("there is no such page").into_response(),
     }
 }

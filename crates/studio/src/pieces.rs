@@ -13,7 +13,7 @@ pub struct Pieces {
     /// True if a person changed the pieces; otherwise `build` divides by itself.
     pub is_painted: bool,
     /// Division that the pieces show; `None` once the options would give another.
-    pub divided: Option<Arc<SegmentedSurface>>,
+    pub division: Option<Arc<SegmentedSurface>>,
     /// Notes on the division.
     pub notes: Vec<String>,
 }
@@ -24,7 +24,7 @@ impl Pieces {
         Self {
             labels: Arc::new(labels),
             is_painted: true,
-            divided: None,
+            division: None,
             notes: Vec::new(),
         }
     }

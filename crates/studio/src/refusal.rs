@@ -28,7 +28,7 @@ impl Refusal {
     }
 
     /// Refusal of a request for something that does not exist, or not yet.
-    pub fn missing(words: impl Into<String>) -> Self {
+    pub fn not_found(words: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, words)
     }
 

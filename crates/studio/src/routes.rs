@@ -68,7 +68,7 @@ pub fn app(address: &Address, jobs: Arc<Jobs>, bench: Arc<Bench>) -> Router {
         .route("/api/events", get(events))
         .route("/api/kit.zip", get(archive))
         .route("/kit/{token}/{*name}", get(kit_file))
-        .fallback(async || Refusal::missing("there is no such thing here"))
+        .fallback(async || Refusal::not_found("there is no such thing here"))
         .layer(DefaultBodyLimit::max(MOST_OTHER_BYTES))
         .layer(from_fn_with_state(studio.clone(), guard))
         .with_state(studio)
@@ -89,7 +89,7 @@ async fn apart<T: Send + 'static>(
 }
 
 /// Runs work as [`apart`] does, then tells all open pages that the project has changed.
-async fn changing<T: Send + 'static>(
+async fn change<T: Send + 'static>(
     studio: &Studio,
     work: impl FnOnce(&Bench) -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
@@ -113,7 +113,7 @@ async fn options(State(studio): State<Studio>) -> Answer<Vec<Offer>> {
 }
 
 async fn choose(State(studio): State<Studio>, Json(changes): Json<Map<String, Value>>) -> Answer<Vec<Offer>> {
-    changing(&studio, move |bench| {
+    change(&studio, move |bench| {
         bench.choose(&changes)?;
         Ok(Json(bench.options()))
     })
@@ -126,13 +126,13 @@ struct Named {
 }
 
 async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Body) -> Answer<Shown> {
-    let file = kept(&studio, body).await?;
-    changing(&studio, move |bench| bench.open_file(&named.name, file.path())).await?;
+    let file = store_body(&studio, body).await?;
+    change(&studio, move |bench| bench.open_file(&named.name, file.path())).await?;
     project(State(studio)).await
 }
 
 /// Stores the body as a temporary file in the project's folder, deleted when dropped.
-async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Refusal> {
+async fn store_body(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Refusal> {
     let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be kept: {e}"));
     let mut file = tempfile::Builder::new()
         .prefix(".upload-")
@@ -152,7 +152,7 @@ async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Re
 }
 
 async fn open_figure(State(studio): State<Studio>, Json(named): Json<Named>) -> Answer<Shown> {
-    changing(&studio, move |bench| bench.open_figure(&named.name)).await?;
+    change(&studio, move |bench| bench.open_figure(&named.name)).await?;
     project(State(studio)).await
 }
 
@@ -165,7 +165,7 @@ async fn mesh(State(studio): State<Studio>) -> Result<Response, Refusal> {
 }
 
 async fn divide(State(studio): State<Studio>) -> Answer<Divided> {
-    changing(&studio, |bench| bench.divide()).await.map(Json)
+    change(&studio, |bench| bench.divide()).await.map(Json)
 }
 
 async fn labels(State(studio): State<Studio>) -> Result<Response, Refusal> {
@@ -173,7 +173,7 @@ async fn labels(State(studio): State<Studio>) -> Result<Response, Refusal> {
 }
 
 async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer<Divided> {
-    changing(&studio, move |bench| bench.paint(&body)).await.map(Json)
+    change(&studio, move |bench| bench.paint(&body)).await.map(Json)
 }
 
 async fn judge(State(studio): State<Studio>) -> Answer<Judgement> {
@@ -185,11 +185,11 @@ async fn cut(State(studio): State<Studio>) -> Result<Response, Refusal> {
 }
 
 async fn mend(State(studio): State<Studio>) -> Answer<Divided> {
-    changing(&studio, |bench| bench.mend()).await.map(Json)
+    change(&studio, |bench| bench.mend()).await.map(Json)
 }
 
 async fn mirror(State(studio): State<Studio>) -> Answer<Divided> {
-    changing(&studio, |bench| bench.mirror()).await.map(Json)
+    change(&studio, |bench| bench.mirror()).await.map(Json)
 }
 
 #[derive(Deserialize)]
@@ -198,7 +198,7 @@ struct Place {
 }
 
 async fn place_key(State(studio): State<Studio>, Json(place): Json<Place>) -> Answer<Vec<Offer>> {
-    changing(&studio, move |bench| {
+    change(&studio, move |bench| {
         bench.place_key(place.at)?;
         Ok(Json(bench.options()))
     })

@@ -10,7 +10,7 @@ use shellock::segmentation::MOST_PIECES;
 use shellock_formats::{read_labels, write_labels};
 use shellock_job::files::write;
 use shellock_job::input::{read, sha256};
-use shellock_job::options::{Choice, Choices, relabelled};
+use shellock_job::options::{Choice, Choices, relabel};
 use shellock_job::output::PLAN;
 use shellock_job::project::{ModelOf, Project, beside};
 use shellock_job::{Failure, config};
@@ -66,7 +66,7 @@ impl Store {
             found.choices = choices;
             if is_labelled {
                 let (labels, numbering) = labels_in(&folder.join(LABELS))?;
-                found.choices = relabelled(&found.choices, |label| numbering.number(label));
+                found.choices = relabel(&found.choices, |label| numbering.number(label));
                 found.labels = Some(numbering.pieces(&labels));
             }
         }
@@ -161,7 +161,7 @@ impl Store {
             .and_then(|bytes| serde_json::from_slice(&bytes).ok())
             .unwrap_or_default();
         Some(LastKit {
-            passed: noted.passed,
+            has_passed: noted.passed,
             is_current: noted.made_of == self.state(),
             summary: noted.summary,
         })
@@ -183,7 +183,7 @@ struct Noted {
 #[derive(Debug)]
 pub struct LastKit {
     /// True if it passes every check.
-    pub passed: bool,
+    pub has_passed: bool,
     /// True if it is of the project's present state.
     pub is_current: bool,
     /// Result of `build` as it was printed.

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use shellock_job::batch::{ENDINGS, PAGE, RECORDS, Record, Status, models, tables};
-use shellock_job::build::checked;
+use shellock_job::build::check_options;
 use shellock_job::files::{with_slashes, write};
 use shellock_job::input::sha256;
 use shellock_job::{Failure, child};
@@ -30,7 +30,7 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Runs `shellock batch` and returns the exit code: 0 if every model has a verified kit, else 1.
 pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
-    checked(&options.options.options)?;
+    check_options(&options.options.options)?;
     if options.options.options.labels.is_some() {
         return Err(Failure::Wrong(
             "--labels is of one model; in a batch labels come from the models' files".to_owned(),
@@ -56,7 +56,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
             scope.spawn(|| shop.work());
         }
     });
-    let records = shop.done.into_inner().expect("no worker panics");
+    let records = shop.records.into_inner().expect("no worker panics");
     if session.job.is_stopped() {
         return Err(Failure::BatchStopped);
     }
@@ -66,7 +66,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     if let Some(problem) = records.iter().find_map(|r| r.unwritten.clone()) {
         return Err(Failure::Wrong(problem));
     }
-    told(session, options, &records);
+    report_results(session, options, &records);
     Ok(u8::from(records.iter().any(|r| r.status != Status::Verified)))
 }
 
@@ -93,7 +93,7 @@ struct Shop<'a> {
     n_models: usize,
     queue: Mutex<Queue>,
     has_room: Condvar,
-    done: Mutex<Vec<Record>>,
+    records: Mutex<Vec<Record>>,
 }
 
 impl<'a> Shop<'a> {
@@ -104,7 +104,7 @@ impl<'a> Shop<'a> {
             n_models: models.len(),
             queue: Mutex::new(Queue::new(models, free_mb)),
             has_room: Condvar::new(),
-            done: Mutex::default(),
+            records: Mutex::default(),
         }
     }
 
@@ -115,13 +115,13 @@ impl<'a> Shop<'a> {
                 Some(first) => self.run.again(self.session, &task.job, first),
             };
             let model = with_slashes(&task.job.model);
-            let record = self.queue.lock().expect("no worker panics").ended(task, record);
+            let record = self.queue.lock().expect("no worker panics").finish(task, record);
             self.has_room.notify_all();
             if self.session.job.is_stopped() {
                 return;
             }
             if let Some(record) = record {
-                let mut done = self.done.lock().expect("no worker panics");
+                let mut done = self.records.lock().expect("no worker panics");
                 let at = done.partition_point(|other| other.model < record.model);
                 self.tell(&record, done.len() + 1);
                 done.insert(at, record);
@@ -152,7 +152,7 @@ impl<'a> Shop<'a> {
     }
 
     fn tell_of_another_time(&self, model: &str) {
-        match self.session.shown {
+        match self.session.progress_form {
             Shown::Nothing => {}
             Shown::Events => eprintln!("{}", json!({ "event": "again", "model": model })),
             Shown::ForPeople => {
@@ -165,7 +165,7 @@ impl<'a> Shop<'a> {
     }
 
     fn tell(&self, record: &Record, number: usize) {
-        match self.session.shown {
+        match self.session.progress_form {
             Shown::Nothing => {}
             Shown::Events => eprintln!(
                 "{}",
@@ -176,7 +176,7 @@ impl<'a> Shop<'a> {
     }
 }
 
-fn told(session: &Session, options: &BatchOptions, records: &[Record]) {
+fn report_results(session: &Session, options: &BatchOptions, records: &[Record]) {
     let n = |status| records.iter().filter(|r| r.status == status).count();
     let verified = n(Status::Verified);
     if session.is_json {
@@ -187,7 +187,7 @@ fn told(session: &Session, options: &BatchOptions, records: &[Record]) {
                     "models": records.len(), "by_status": all, "out": options.out,
                     "exit_code": u8::from(verified < records.len()) })
         );
-    } else if session.shown == Shown::ForPeople {
+    } else if session.progress_form == Shown::ForPeople {
         println!(
             "{verified} of {} models have a kit that passes every check: {}",
             records.len(),

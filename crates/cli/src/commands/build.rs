@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use shellock::Severity;
 use shellock::design::Params;
-use shellock_job::build::{Begun, Made, checked};
+use shellock_job::build::{Begun, Made, check_options};
 use shellock_job::input::{self, Model};
 use shellock_job::options::Pieces;
 use shellock_job::output::Destination;
@@ -21,7 +21,7 @@ use crate::progress::{Display, Shown};
 
 /// Runs `shellock build` and returns the exit code.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
-    let params = checked(options)?;
+    let params = check_options(options)?;
     let stem = file
         .file_stem()
         .map_or_else(|| "model".into(), |s| s.to_string_lossy().into_owned());
@@ -37,7 +37,7 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
 pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
     /// Default number of pieces of the squirrel: fewer than usual, which lock sooner.
     const OF_SQUIRREL: usize = 7;
-    let mut params = checked(options)?;
+    let mut params = check_options(options)?;
     if figure == "squirrel" && options.pieces == Pieces::Auto {
         params.n_pieces = Some(OF_SQUIRREL);
     }
@@ -58,7 +58,7 @@ fn make(
 ) -> Result<u8, Failure> {
     let begun = Begun::new(&session.job, model, options, params)?;
     let n_told = begun.notes().len();
-    let is_for_people = session.shown == Shown::ForPeople;
+    let is_for_people = session.progress_form == Shown::ForPeople;
     if is_for_people {
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
@@ -70,15 +70,15 @@ fn make(
             .iter()
             .for_each(|w| println!("warning: {w}"));
     }
-    let display = Display::of_kit(session.shown);
-    let made = begun.made(&session.job, &|p| display.show(p));
+    let display = Display::of_kit(session.progress_form);
+    let made = begun.make(&session.job, &|p| display.show(p));
     display.finish();
     let made = made?;
     if is_for_people {
         made.notes[n_told..].iter().for_each(|n| println!("note: {n}"));
     }
     to.write(&made.files)?;
-    let code = u8::from(!made.passed());
+    let code = u8::from(!made.has_passed());
     let standing = Standing::of(options.up, model.solid.mesh());
     // The model's own warnings were printed with the first lines.
     let mut warnings = made.warnings.clone();
@@ -86,18 +86,18 @@ fn make(
     if session.is_json {
         let stages = display.stages();
         print_json(to, &made, &stages, code);
-    } else if session.shown == Shown::Nothing {
+    } else if session.progress_form == Shown::Nothing {
         warnings.retain(|w| w.severity() > Severity::Note);
         print_warnings(session, &warnings, &standing);
         print_failures(&made.design.kit.verification, &standing);
     } else {
         let finished = Finished {
             to,
-            made: &made.design,
+            design: &made.design,
             settings: &made.design.settings,
             summary: &made.summary,
             warnings: &warnings,
-            standing: &standing,
+            upright: &standing,
             printing: &made.printing,
         };
         finished.print(session);

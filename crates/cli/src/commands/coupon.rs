@@ -37,7 +37,7 @@ pub fn coupon(session: &Session, options: &CouponOptions) -> Result<u8, Failure>
         let path = options.config.clone().unwrap_or_else(|| USUAL.into());
         let fit = fits[number as usize - 1];
         save(&path, &printer, &fit, name)?;
-        tell_saved(session, &path, &printer, &fit, name);
+        tell_profile(session, &path, &printer, &fit, name);
         return Ok(0);
     }
     let files = destination(options.out.as_deref(), options.force)?;
@@ -131,7 +131,7 @@ impl<'a> Plate<'a> {
                 name,
                 color: palette::color(part.fit.number as usize),
                 mesh: &part.mesh,
-                rotation: Some(part.turned),
+                rotation: Some(part.axes),
                 moved_mm: part.moved_mm,
             })
             .collect();
@@ -167,13 +167,13 @@ impl<'a> Plate<'a> {
     fn tell(&self, session: &Session, files: &[PathBuf; 2]) {
         let name = &self.printer.name;
         if session.is_json {
-            let numbers: Vec<Value> = self.fits.iter().map(told).collect();
+            let numbers: Vec<Value> = self.fits.iter().map(describe).collect();
             let value = json!({ "status": "done", "out": files, "printer": name, "parts": self.parts.len(),
                 "numbers": numbers, "size": self.size_mm, "print_seconds": self.seconds() });
             println!("{value}");
             return;
         }
-        if session.shown == Shown::Nothing {
+        if session.progress_form == Shown::Nothing {
             return;
         }
         let [width, depth, height] = self.size_mm;
@@ -196,7 +196,7 @@ impl<'a> Plate<'a> {
             "print it as it lies, without supports; the least number whose pin and key go in by hand is \
              yours. Keep it, where it is 2 for example, with:\n  shellock coupon --printer {} --fits 2 \
              --save workshop",
-            quoted(name)
+            quote(name)
         );
     }
 }
@@ -211,7 +211,7 @@ fn object_name(part: &Part) -> String {
 }
 
 /// Quotes a name for a shell where it needs quotes.
-fn quoted(name: &str) -> String {
+fn quote(name: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
     if name.chars().all(is_plain) {
         name.to_owned()
@@ -220,17 +220,17 @@ fn quoted(name: &str) -> String {
     }
 }
 
-fn told(fit: &Fit) -> Value {
+fn describe(fit: &Fit) -> Value {
     json!({ "number": fit.number, "clearance": fit.clearance_mm, "key_clearance": fit.key_clearance_mm,
             "tolerance": fit.tolerance_mm })
 }
 
-fn tell_saved(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &str) {
+fn tell_profile(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &str) {
     if session.is_json {
         let value = json!({ "status": "done", "out": path, "printer": name, "based_on": base.name,
-                            "fits": told(fit) });
+                            "fits": describe(fit) });
         println!("{value}");
-    } else if session.shown != Shown::Nothing {
+    } else if session.progress_form != Shown::Nothing {
         println!(
             "{}: printer \"{name}\" has clearance {}, on rails {}, tolerance {} mm; `shellock build MODEL \
              --printer {}` uses them",
@@ -238,7 +238,7 @@ fn tell_saved(session: &Session, path: &Path, base: &Printer, fit: &Fit, name: &
             fit.clearance_mm,
             fit.key_clearance_mm,
             fit.tolerance_mm,
-            quoted(name)
+            quote(name)
         );
     }
 }

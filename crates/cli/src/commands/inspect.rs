@@ -9,8 +9,8 @@ use shellock_geom::check::{Inspection, inspect as inspection};
 use shellock_geom::repair::repair;
 use shellock_geom::weld::weld;
 use shellock_job::division::{self, Division, divide};
-use shellock_job::failure::listed;
-use shellock_job::input::{Model, load_selected, model_of, objects, repair_mode, selection};
+use shellock_job::failure::list_names;
+use shellock_job::input::{Model, load_selection, model_of, objects, repair_mode, selection};
 use shellock_job::place::Standing;
 use shellock_job::shape::shape_warnings;
 use shellock_job::{Failure, Options};
@@ -33,7 +33,7 @@ pub enum Wanted {
 pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted) -> Result<u8, Failure> {
     let (loaded, bytes) = session
         .job
-        .during("reading", || load_selected(file, &selection(options)))?;
+        .during("reading", || load_selection(file, &selection(options)))?;
     let found = inspection(&weld(&loaded.mesh).mesh);
     if !session.is_json {
         print_file(&loaded, &found);
@@ -51,7 +51,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
         _ => None,
     };
     if session.is_json {
-        println!("{}", told(&loaded, &found, &model, &thin, division.as_ref()));
+        println!("{}", describe(&loaded, &found, &model, &thin, division.as_ref()));
         // The printed JSON holds the reason.
         return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
@@ -63,7 +63,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
 /// Divides the model, and shows progress meanwhile.
 fn shown_division(session: &Session, model: &Model, options: &Options) -> Result<Division, Failure> {
     let params = division::params(&session.job, model, options)?;
-    let display = Display::new(session.shown);
+    let display = Display::new(session.progress_form);
     let report = |p: shellock::Progress<'_>| display.show(p);
     let division = divide(Ctx::new(&report, &session.job.stop), params, model, options);
     display.finish();
@@ -92,7 +92,7 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
     );
     let objects = objects(loaded);
     if !objects.is_empty() {
-        println!("objects {}", listed(&objects));
+        println!("objects {}", list_names(&objects));
     }
     if !loaded.labellings.is_empty() {
         println!("divided by {}", labellings(loaded).join(", "));
@@ -138,7 +138,7 @@ fn print_model(
 }
 
 /// Builds the whole answer as JSON.
-fn told(
+fn describe(
     loaded: &Loaded,
     found: &Inspection,
     model: &Result<Model, Failure>,

@@ -21,7 +21,7 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
         )));
     }
     let own = OwnAssembly::read(folder)?;
-    let display = Display::new(session.shown);
+    let display = Display::new(session.progress_form);
     let report = |p: shellock::Progress<'_>| display.show(p);
     let found = own.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::{Value, json};
 use shellock::PatchId;
 use shellock::design::Planned;
-use shellock_job::bed::fitted;
-use shellock_job::build::{checked, planned};
+use shellock_job::bed::fit_params;
+use shellock_job::build::{check_options, plan_model};
 use shellock_job::place::Standing;
 use shellock_job::told::{quality, weakest};
 use shellock_job::{Failure, Options, bears_lines, input};
@@ -18,10 +18,10 @@ use crate::progress::Display;
 /// Runs `shellock plan` and returns the exit code.
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
     let model = input::simple_model(&session.job, file, options)?;
-    let params = fitted(&session.job, &checked(options)?, options, &model)?;
-    let display = Display::new(session.shown);
+    let params = fit_params(&session.job, &check_options(options)?, options, &model)?;
+    let display = Display::new(session.progress_form);
     print_input_warnings(session, &model);
-    let planned = planned(&session.job, &model, options, &params, &|p| display.show(p));
+    let planned = plan_model(&session.job, &model, options, &params, &|p| display.show(p));
     display.finish();
     let Planned {
         plan,

@@ -5,10 +5,10 @@ use std::path::Path;
 use serde_json::json;
 use shellock::Ctx;
 use shellock_formats::{write_labels, write_ply};
-use shellock_job::build::checked;
-use shellock_job::division::{divided, labels_of_file};
+use shellock_job::build::check_options;
+use shellock_job::division::{divide_model, labels_of_file};
 use shellock_job::files::{extension, write};
-use shellock_job::paint::painted;
+use shellock_job::paint::paint_patches;
 use shellock_job::place::Standing;
 use shellock_job::{Failure, Options, input};
 
@@ -18,7 +18,7 @@ use crate::progress::Display;
 
 /// Runs `shellock segment` and returns the exit code.
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
-    checked(options)?;
+    check_options(options)?;
     let kind = extension(out);
     if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
         return Err(Failure::Wrong(format!(
@@ -27,10 +27,10 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         )));
     }
     let model = input::model(&session.job, file, options)?;
-    let display = Display::new(session.shown);
+    let display = Display::new(session.progress_form);
     let report = |p: shellock::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.job.stop);
-    let surface = divided(&session.job, &ctx, &model, options)?;
+    let surface = divide_model(&session.job, &ctx, &model, options)?;
     display.finish();
     let mut notes = model.notes.clone();
     let bytes = match kind.as_str() {
@@ -39,7 +39,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
             write_ply(&surface.mesh, Some(&labels))
         }
         "3mf" => {
-            let (bytes, is_distinct) = painted(&model.name, &surface);
+            let (bytes, is_distinct) = paint_patches(&model.name, &surface);
             if !is_distinct {
                 notes
                     .push("slicers have 16 colours of paint: pieces that do not touch share some".to_owned());

@@ -15,7 +15,7 @@ use crate::progress::Display;
 /// Runs `shellock test` and returns the exit code: 0 if the kit holds, else 1.
 pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
     let test = StressTest::read(kit, &blows.into())?;
-    let display = Display::new(session.shown);
+    let display = Display::new(session.progress_form);
     let report = |p: shellock::Progress<'_>| display.show(p);
     let tested = run(&Ctx::new(&report, &session.job.stop), &test, blows.compare);
     display.finish();
@@ -27,7 +27,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         print_table(&test.params, &tested);
         println!("written to {}: stress.json, stress.svg", kit.display());
     }
-    Ok(u8::from(!tested.passed()))
+    Ok(u8::from(!tested.has_passed()))
 }
 
 /// Runs the test, after the comparison with worse plans if that is asked for.

@@ -15,7 +15,7 @@ use crate::progress::Display;
 /// Runs `shellock verify` and returns the exit code: 0 if every check passes, else 1.
 pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8, Failure> {
     let kit = Finished::read(kit, model)?;
-    let display = Display::new(session.shown);
+    let display = Display::new(session.progress_form);
     let report = |p: shellock::Progress<'_>| display.show(p);
     let verdict = kit.verify(&Ctx::new(&report, &session.job.stop));
     display.finish();
@@ -28,7 +28,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
                     "exit_code": code })
         );
     } else {
-        match kit.standing() {
+        match kit.upright() {
             Some(standing) => print_verdict(&verdict, &standing),
             None => print_verdict(&verdict, &Coordinates),
         }

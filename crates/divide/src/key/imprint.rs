@@ -24,7 +24,7 @@ const FRAGMENT_SHARE: f64 = 0.08;
 ///
 /// Patches that the key cuts in two become two, or lose a small part to a neighbour. Ids change.
 pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(SegmentedSurface, PatchId)> {
-    let (mesh, patch_of_face, source_face) = refined(surface, prism)?;
+    let (mesh, patch_of_face, source_face) = refine_near_prism(surface, prism)?;
     let value = |p| {
         let mm: f64 = prism.inside_mm(p);
         if mm.abs() < LEAST_MM { LEAST_MM } else { mm }
@@ -75,7 +75,10 @@ pub fn patch_in(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<PatchId>
 }
 
 /// Refines the surface so that edges near the prism's sides are short.
-fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec<PatchId>, Vec<u32>)> {
+fn refine_near_prism(
+    surface: &SegmentedSurface,
+    prism: &KeyPrism,
+) -> Option<(TriMesh, Vec<PatchId>, Vec<u32>)> {
     let mut solid = Solid::new(surface.mesh.clone()).ok()?;
     let (mut patch, mut source) = (surface.patch_of_face.clone(), surface.source_face.clone());
     for _ in 0..MOST_HALVINGS {
@@ -141,7 +144,7 @@ fn without_fragments(
         let Some((fragment, into)) =
             fragment.and_then(|c| Some((c, neighbour(mesh, topology, &component, &of, c, key)?)))
         else {
-            return numbered(&component, &of, n);
+            return number_components(&component, &of, n);
         };
         component
             .iter()
@@ -181,7 +184,7 @@ fn neighbour(
 }
 
 /// Numbers components by their old label, then by their lowest face.
-fn numbered(component: &[u32], of: &[u32], n: usize) -> (Vec<u32>, usize) {
+fn number_components(component: &[u32], of: &[u32], n: usize) -> (Vec<u32>, usize) {
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|&c| (of[c], c));
     let mut number = vec![0; n];

@@ -59,7 +59,7 @@ pub struct KeySite {
     /// Area of the key's surface, mm².
     pub area_mm2: f64,
     /// Visibility of the key from above, in [0, 1]: 0 underneath, 1 on top.
-    pub shown: f64,
+    pub visibility: f64,
     /// Quality of the site; larger is better.
     pub score: f64,
 }
@@ -111,7 +111,7 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
             off_mm < edge_mm
         });
     }
-    let kept = kept(params, surface, &topology);
+    let kept = no_key_centres(params, surface, &topology);
     candidates.retain(|site| !overlaps(&site.prism, params.size_mm, &kept));
     ctx.check()?;
     let by_score = |a: &KeySite, b: &KeySite| b.score.total_cmp(&a.score);
@@ -144,7 +144,7 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
 }
 
 /// Centres of the faces from which no key is cut.
-fn kept(params: &KeyParams, surface: &SegmentedSurface, topology: &Topology) -> Vec<Vec3> {
+fn no_key_centres(params: &KeyParams, surface: &SegmentedSurface, topology: &Topology) -> Vec<Vec3> {
     let mesh = &surface.mesh;
     let whole = segmentation::whole(&params.keep_whole, mesh, topology, &surface.source_face, 0.0);
     let faces = whole.sets().iter().flatten();
@@ -200,7 +200,7 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
     for (_, p) in refined {
         let is_same = |q: &Plane| q.normal.dot(p.normal) > 0.98 && q.at.distance(p.at) < 0.5 * reach_mm;
         if kept.len() < MOST_PLANES && !kept.iter().any(is_same) {
-            kept.push(snapped(p));
+            kept.push(snap(p));
         }
     }
     kept
@@ -208,7 +208,7 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
 
 /// Snaps a plane that is nearly level or upright to exactly so: nobody wants a model turned by a tenth of a
 /// degree.
-fn snapped(p: Plane) -> Plane {
+fn snap(p: Plane) -> Plane {
     /// Cosine of the snapping angle, 2°.
     const NEARLY: f64 = 0.9994;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|a| [a, -a]);
@@ -316,12 +316,12 @@ fn along(
                 depth_mm: params.depth_mm(),
                 corner_mm: CORNER_SIZES * params.size_mm,
             };
-            scored(params, spots, plane, prism, width_mm)
+            score_plane(params, spots, plane, prism, width_mm)
         })
         .collect()
 }
 
-fn scored(
+fn score_plane(
     params: &KeyParams,
     spots: &[Spot],
     plane: Plane,
@@ -365,7 +365,7 @@ fn scored(
         side_share,
         rail_mm: 0.0,
         area_mm2: area,
-        shown,
+        visibility: shown,
         score,
     })
 }

@@ -6,7 +6,7 @@ use shellock_report::{Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 
 use super::keep_whole::{place_in, tell_cut};
-use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, resolved, user_labels};
+use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, resolve_regions, user_labels};
 
 /// Least share of area for a label to lie mainly in a piece, or a piece mainly in a label. Smoothing moves
 /// less.
@@ -77,10 +77,10 @@ pub fn tell(
         let cleaned = user_labels(ctx, params, solid, given)?;
         let names = names(solid, given, &cleaned);
         let changes = Changes::between(&cleaned, surface);
-        tell_divided(ctx, &changes, &names, surface);
-        tell_joined(ctx, &changes, &names, surface);
+        tell_divisions(ctx, &changes, &names, surface);
+        tell_joins(ctx, &changes, &names, surface);
     }
-    let keep = resolved(&params.keep_whole, solid, labels)?;
+    let keep = resolve_regions(&params.keep_whole, solid, labels)?;
     tell_cut(ctx, &keep, surface);
     let limit_mm = kept_limit_mm(params, surface);
     if limit_mm < params.min_contact_mm {
@@ -107,7 +107,7 @@ fn names(solid: &Solid, given: &[i64], cleaned: &FaceLabels) -> Vec<i64> {
     area.iter().map(|of| most(of).unwrap_or_default()).collect()
 }
 
-fn tell_divided(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
+fn tell_divisions(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
     let divided: Vec<usize> = (0..names.len())
         .filter(|&l| changes.pieces_of[l].len() > 1)
         .collect();
@@ -124,7 +124,7 @@ fn tell_divided(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &Segmented
     ctx.warn(Warning::new(Cause::LabelsDivided { into }, pieces, at));
 }
 
-fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
+fn tell_joins(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
     for (piece, labels) in changes
         .labels_of
         .iter()

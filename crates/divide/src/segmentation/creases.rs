@@ -83,7 +83,7 @@ pub(super) fn crease_labels(
     // Only bodies without a seed stay unreached. They go to the first patch, and the labels' check splits
     // them off again.
     owner.iter_mut().filter(|o| **o == u32::MAX).for_each(|o| *o = 0);
-    Ok(FaceLabels::from_connected(&topology, &owner))
+    Ok(FaceLabels::from_components(&topology, &owner))
 }
 
 /// Default number of pieces for a surface of `area_mm2`, in [6, 24]: 10 for a 150 mm figure, as the paper's 9

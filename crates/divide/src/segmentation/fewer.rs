@@ -22,13 +22,13 @@ const FORESEEN: [f64; 3] = [1.6, 1.3, 1.0];
 /// parts. Even the first has all merges that pay for themselves.
 pub(super) fn with_fewer_parts(solid: &Solid, labels: &FaceLabels, n_wanted: usize) -> Vec<FaceLabels> {
     let topology = Topology::new(solid);
-    let mut parts = Parts::new(solid.mesh(), &topology, labels);
+    let mut parts = MergeState::new(solid.mesh(), &topology, labels);
     while parts.merge_cheapest(|loss| loss <= 0.0) {}
     let mut found: Vec<FaceLabels> = Vec::new();
     for share in FORESEEN {
         let most = (share * n_wanted as f64) as usize;
         while parts.n_foreseen() > most && parts.merge_cheapest(|_| true) {}
-        let merged = FaceLabels::from_connected(&topology, &parts.labels(labels));
+        let merged = FaceLabels::from_components(&topology, &parts.labels(labels));
         if found.last().is_none_or(|last| last.n_patches != merged.n_patches) {
             found.push(merged);
         }
@@ -68,7 +68,7 @@ impl Border {
 }
 
 /// State of the parts during merging.
-struct Parts {
+struct MergeState {
     /// For each part, the part that it was merged into.
     into: Vec<u32>,
     /// Share of the area, by part.
@@ -77,7 +77,7 @@ struct Parts {
     borders: BTreeMap<[u32; 2], Border>,
 }
 
-impl Parts {
+impl MergeState {
     fn new(mesh: &TriMesh, topology: &Topology, labels: &FaceLabels) -> Self {
         let (label, n) = (labels.as_slice(), labels.n_patches());
         let (mut share, total) = (vec![0.0; n], mesh.area().max(f64::MIN_POSITIVE));
@@ -88,7 +88,7 @@ impl Parts {
         let mut borders: BTreeMap<[u32; 2], Border> = BTreeMap::new();
         for h in seam_half_edges(topology, label, 0..label.len() as u32) {
             let sides = [h, topology.opposite(h)].map(|h| label[h as usize / 3]);
-            let border = borders.entry(ordered(sides)).or_default();
+            let border = borders.entry(sort_pair(sides)).or_default();
             let (a, b) = ends(mesh, h);
             border.n_edges += 1;
             border.points.extend([a, b]);
@@ -156,7 +156,7 @@ impl Parts {
         for pair in of_b {
             let moved = self.borders.remove(&pair).unwrap_or_default();
             let other = if pair[0] == b { pair[1] } else { pair[0] };
-            let kept = self.borders.entry(ordered([a, other])).or_default();
+            let kept = self.borders.entry(sort_pair([a, other])).or_default();
             kept.n_edges += moved.n_edges;
             kept.points.extend(moved.points);
         }
@@ -173,7 +173,7 @@ impl Parts {
     }
 }
 
-fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
+fn sort_pair([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
@@ -197,7 +197,7 @@ mod tests {
             if z > 8.0 { 0 } else { u32::from(z < 0.0) + 1 }
         };
         let label: Vec<u32> = (0..ball.mesh().triangles.len()).map(slice).collect();
-        let labels = FaceLabels::from_connected(&Topology::new(&ball), &label);
+        let labels = FaceLabels::from_components(&Topology::new(&ball), &label);
         (ball, labels)
     }
 

@@ -69,7 +69,7 @@ pub(super) fn halve_edges_near_seams(
         }
         let (next, parent) = halve_edges(&fine, &topology, wants);
         source_face = parent.iter().map(|&f| source_face[f as usize]).collect();
-        fine_labels = fine_labels.inherited(&parent);
+        fine_labels = fine_labels.inherit(&parent);
         fine = next;
     }
 }

@@ -34,7 +34,7 @@ pub enum KeepWhole {
     },
     /// Triangles with this label, if there are labels.
     Label(i64),
-    /// Triangles of the model. [`resolved`] turns a label into these.
+    /// Triangles of the model. [`resolve_regions`] turns a label into these.
     Faces(Vec<u32>),
 }
 
@@ -100,7 +100,7 @@ impl KeepWhole {
 /// Replaces labels by the triangles that have them, and checks each region against the model.
 ///
 /// Fails if a region is empty, has more than half of the surface, or names a label of a model without labels.
-pub fn resolved(
+pub fn resolve_regions(
     keep: &[KeepWhole],
     solid: &Solid,
     labels: Option<&[i64]>,
@@ -194,7 +194,7 @@ pub(super) fn margin_mm(params: &SegmentationParams) -> f64 {
 
 /// Gives each set of `whole` to the patch that has most of it. Patches that are then too small join a
 /// neighbour.
-pub(super) fn gathered(
+pub(super) fn gather_regions(
     ctx: &Ctx,
     params: &SegmentationParams,
     solid: &Solid,

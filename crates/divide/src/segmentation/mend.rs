@@ -6,7 +6,7 @@ use shellock_surface::SegmentedSurface;
 
 use super::method::symmetry_plane;
 use super::refine::{Ground, n_faults, refine_on};
-use super::settle::settled;
+use super::settle::settle_seams;
 use super::smooth::smooth_and_cut;
 use super::{FaceLabels, LabelOrigin, SegmentationError, SegmentationParams};
 
@@ -38,7 +38,7 @@ pub(super) fn held_twice(
         is_drawn: matches!(origin, LabelOrigin::Drawn { .. }),
         is_too_dear: &is_too_dear,
     };
-    if let Some(mirrored) = origin.mirrored()
+    if let Some(mirrored) = origin.mirror()
         && let Some((0, surface)) = job.rounds(labels.clone(), Some(mirrored))?
     {
         return Ok(Some((0, surface)));
@@ -108,7 +108,7 @@ fn mended_alike(
 ) -> Result<FaceLabels, SegmentationError> {
     let mut alike = mirrored.labels(ground.graph(), labels.as_slice());
     ground.whole.gather(&mut alike, &ground.graph().area_mm2);
-    let alike = FaceLabels::from_connected(&ground.topology, &alike);
+    let alike = FaceLabels::from_components(&ground.topology, &alike);
     let mended = refine_on(ctx, params, ground, &alike)?;
     let most = MORE_FOR_SYMMETRY * labels.n_patches() as f64;
     let is_good = mended.n_patches() as f64 <= most
@@ -123,7 +123,7 @@ fn settled_surface(
     ground: &Ground<'_>,
     labels: &FaceLabels,
 ) -> Result<SegmentedSurface, SegmentationError> {
-    let settled = settled(params, ground, labels);
+    let settled = settle_seams(params, ground, labels);
     match smooth_and_cut(ctx, params, ground.solid, &settled) {
         Err(SegmentationError::PatchVanished { .. }) => smooth_and_cut(ctx, params, ground.solid, labels),
         made => made,

@@ -17,7 +17,7 @@ use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
 
 use super::creases::crease_labels;
 use super::halve::halve_long_edges;
-use super::keep_whole::gathered;
+use super::keep_whole::gather_regions;
 use super::refine::Ground;
 use super::user::user_labels;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
@@ -68,7 +68,7 @@ impl Method {
     }
 
     /// Finds the method with this name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
@@ -141,7 +141,7 @@ pub fn mirrored_labels(params: &SegmentationParams, solid: &Solid, labels: &[u32
 }
 
 /// Message about the plane of a division that was to be symmetric.
-fn told(plane: Option<Plane>) -> String {
+fn symmetry_message(plane: Option<Plane>) -> String {
     let Some(Plane { at, normal }) = plane else {
         return "no plane of symmetry is found: both sides are divided as they are".to_owned();
     };
@@ -160,7 +160,12 @@ pub fn automatic_labels(
     solid: &Solid,
 ) -> Result<Option<FaceLabels>, SegmentationError> {
     let own: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
-    automatic_on(ctx, params, solid, &Ground::keeping(params, solid, &own).whole)
+    automatic_on(
+        ctx,
+        params,
+        solid,
+        &Ground::with_regions(params, solid, &own).whole,
+    )
 }
 
 /// Patches in creases, none of which divides a set of `whole`.
@@ -170,7 +175,7 @@ pub(super) fn creases_on(
     solid: &Solid,
     whole: &Whole,
 ) -> Result<FaceLabels, SegmentationError> {
-    gathered(ctx, params, solid, whole, crease_labels(ctx, params, solid)?)
+    gather_regions(ctx, params, solid, whole, crease_labels(ctx, params, solid)?)
 }
 
 /// Divides like [`automatic_labels`], without dividing any set of `whole`.
@@ -185,7 +190,7 @@ pub(super) fn automatic_on(
     };
     ctx.check()?;
     if params.symmetric && params.method.knows_symmetry() {
-        ctx.note(&told(found.plane));
+        ctx.note(&symmetry_message(found.plane));
     }
     let mut parts = found.part_of_face;
     let mesh = solid.mesh();

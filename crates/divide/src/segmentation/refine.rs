@@ -60,12 +60,12 @@ pub(super) struct Ground<'a> {
 impl<'a> Ground<'a> {
     /// Prepares a surface without regions to keep whole.
     pub fn new(solid: &'a Solid) -> Self {
-        Self::keeping(&SegmentationParams::default(), solid, &[])
+        Self::with_regions(&SegmentationParams::default(), solid, &[])
     }
 
     /// Prepares a surface with the resolved regions that `params` keep whole; `source_face` refers to the
     /// model's triangles.
-    pub fn keeping(params: &SegmentationParams, solid: &'a Solid, source_face: &[u32]) -> Self {
+    pub fn with_regions(params: &SegmentationParams, solid: &'a Solid, source_face: &[u32]) -> Self {
         let topology = Topology::new(solid);
         let (keep, margin_mm) = (&params.keep_whole, margin_mm(params));
         Self {
@@ -100,7 +100,7 @@ pub(super) fn refine_on(
         if let Some((loose, into)) = weakest_link(&work, &graph) {
             work.join(loose, into);
         } else if !work.divide_worst(&seam, &graph, n_idle < MAX_IDLE_DIVISIONS)
-            && !work.join_hanging(&seam, &graph)
+            && !work.join_articulation(&seam, &graph)
         {
             break;
         }
@@ -247,7 +247,7 @@ impl<'a> Work<'a> {
 
     fn apply(&mut self, division: &Division) {
         division
-            .moved
+            .new_half
             .iter()
             .for_each(|&f| self.label[f as usize] = self.n_patches as u32);
         self.n_patches += 1;
@@ -318,7 +318,7 @@ impl<'a> Work<'a> {
     /// Joins two pieces in contact, one of which is an articulation piece. Among the pairs that leave the
     /// fewest faults, takes the one with the smallest piece. Returns false if none leaves fewer faults than
     /// before.
-    fn join_hanging(&mut self, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
+    fn join_articulation(&mut self, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
         if self.n_patches <= 2 {
             return false;
         }
@@ -337,7 +337,7 @@ impl<'a> Work<'a> {
         let counted = graph.contacts().iter().filter(|c| graph.counts(c)).filter(hangs);
         let pairs: Vec<(u32, u32)> = counted.map(ordered).collect();
         let joined = pairs.into_par_iter().map(|(small, large)| {
-            let n_faults = self.faults_if_joined(seam, small, large);
+            let n_faults = self.faults_after_join(seam, small, large);
             (n_faults, areas[small as usize], small, large)
         });
         let mut best: Option<(usize, f64, u32, u32)> = None;
@@ -352,7 +352,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    fn faults_if_joined(&self, seam: &[HalfEdge], small: u32, large: u32) -> usize {
+    fn faults_after_join(&self, seam: &[HalfEdge], small: u32, large: u32) -> usize {
         let last = self.n_patches as u32 - 1;
         let number = |k: u32| if k == small { large } else { k };
         let number = |k: u32| {

@@ -16,7 +16,11 @@ const LEAST_KEPT: f64 = 0.7;
 
 /// Settles the seams of `labels`. A seam stays where it is if its move would shrink a piece too far, lose
 /// one, cut a region to keep whole, or add a fault.
-pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> FaceLabels {
+pub(super) fn settle_seams(
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+    labels: &FaceLabels,
+) -> FaceLabels {
     let graph = ground.graph();
     let settler = border::Settler::new(graph);
     let mut label = labels.as_slice().to_vec();
@@ -37,7 +41,7 @@ pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: 
             if is_worn || ground.whole.is_parted(moved, pair) {
                 return false;
             }
-            let connected = FaceLabels::from_connected(&ground.topology, moved);
+            let connected = FaceLabels::from_components(&ground.topology, moved);
             let n_after = n_faults(params, ground, &connected);
             connected.n_patches() == labels.n_patches() && n_after <= n_before && {
                 n_before = n_after;
@@ -45,7 +49,7 @@ pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: 
             }
         });
     }
-    FaceLabels::from_connected(&ground.topology, &label)
+    FaceLabels::from_components(&ground.topology, &label)
 }
 
 #[cfg(test)]
@@ -56,7 +60,7 @@ mod tests {
     use super::*;
 
     /// A ring whose tube is pinched at both ends of the x axis, where its narrowest sections lie.
-    fn pinched() -> Solid {
+    fn ring_with_pinches() -> Solid {
         let mut ring = torus(30.0, 10.0, [72, 24]);
         for p in &mut ring.points {
             let axis = Vec3::new(p.x, p.y, 0.0).normalize_or_zero() * 30.0;
@@ -70,16 +74,16 @@ mod tests {
         let label: Vec<u32> = (0..solid.mesh().triangles.len())
             .map(|f| u32::from(solid.mesh().face_center(f).y > y))
             .collect();
-        FaceLabels::from_connected(&Topology::new(solid), &label)
+        FaceLabels::from_components(&Topology::new(solid), &label)
     }
 
     #[test]
     fn seams_move_to_the_narrowest_place_within_reach_and_every_piece_stays() {
-        let solid = pinched();
+        let solid = ring_with_pinches();
         let ground = Ground::new(&solid);
         let labels = halves(&solid, 5.0);
         let params = SegmentationParams::default();
-        let settled = settled(&params, &ground, &labels);
+        let settled = settle_seams(&params, &ground, &labels);
         assert_eq!(settled.n_patches(), labels.n_patches());
         assert!(n_faults(&params, &ground, &settled) <= n_faults(&params, &ground, &labels));
         let mesh = solid.mesh();

@@ -45,18 +45,22 @@ pub(super) struct Division {
     pub cost: f64,
     /// Number of faults of the topology after the division.
     pub n_faults: f64,
-    pub moved: Vec<u32>,
+    pub new_half: Vec<u32>,
 }
 
 /// Divides `patch` into two connected halves of similar area by a short seam, mostly across its longest
 /// direction. The new half gets the number `labels.n_patches()`. `None` if the patch is a single triangle or
 /// does not exist.
 pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
-    split_keeping(&Ground::new(solid), labels, patch)
+    split_between_regions(&Ground::new(solid), labels, patch)
 }
 
 /// Divides like [`split_piece`], without parting any set that `ground` keeps whole.
-pub(super) fn split_keeping(ground: &Ground<'_>, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
+pub(super) fn split_between_regions(
+    ground: &Ground<'_>,
+    labels: &FaceLabels,
+    patch: PatchId,
+) -> Option<FaceLabels> {
     let divider = Divider {
         mesh: ground.solid.mesh(),
         topology: &ground.topology,
@@ -67,7 +71,7 @@ pub(super) fn split_keeping(ground: &Ground<'_>, labels: &FaceLabels, patch: Pat
     let mut label = labels.as_slice().to_vec();
     let division = divider.best(&label, labels.n_patches(), patch.0, &[], |_, _| 0.0)?;
     division
-        .moved
+        .new_half
         .iter()
         .for_each(|&f| label[f as usize] = labels.n_patches() as u32);
     Some(FaceLabels {
@@ -155,7 +159,7 @@ impl Divider<'_> {
         cost.is_finite().then_some(Division {
             cost,
             n_faults,
-            moved,
+            new_half: moved,
         })
     }
 

@@ -14,7 +14,7 @@ fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<shellock_report::War
 }
 
 /// A sphere of `radius_mm` with four arms, star-shaped around its centre.
-fn limbed() -> Solid {
+fn sphere_with_arms() -> Solid {
     let arms = [
         Vec3::X,
         Vec3::NEG_X,
@@ -62,7 +62,7 @@ fn assert_patches_are_connected(surface: &SegmentedSurface) {
 
 #[test]
 fn automatic_patches_cover_the_closed_surface_and_hold_each_other_twice() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let params = SegmentationParams::default();
     let surface = with_ctx(|ctx| segment(ctx, &params, &solid, None)).unwrap();
     let cut = Solid::new(surface.mesh.clone()).unwrap();
@@ -83,7 +83,7 @@ fn automatic_patches_cover_the_closed_surface_and_hold_each_other_twice() {
 
 #[test]
 fn the_same_seed_gives_the_same_patches() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let run = || with_ctx(|ctx| segment(ctx, &SegmentationParams::default(), &solid, None)).unwrap();
     let (one, two) = (run(), run());
     assert_eq!((one.mesh, one.patch_of_face), (two.mesh, two.patch_of_face));
@@ -91,7 +91,7 @@ fn the_same_seed_gives_the_same_patches() {
 
 #[test]
 fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let labels = arm_labels(&solid);
     let params = SegmentationParams::default();
     let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, Some(&labels)).unwrap());
@@ -113,7 +113,7 @@ fn segment_thin_arms(
     SegmentedSurface,
     Vec<shellock_report::Warning>,
 ) {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let params = SegmentationParams {
         min_contact_mm: 45.0,
         least_contact_mm,
@@ -148,7 +148,7 @@ fn shorter_contacts_count_before_labels_are_joined_and_the_user_is_told() {
 
 #[test]
 fn other_numbers_for_the_same_patches_give_the_same_seams() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let params = SegmentationParams::default();
     let (one, two) = with_ctx(|ctx| {
         let labels = user_labels(ctx, &params, &solid, &arm_labels(&solid)).unwrap();
@@ -175,7 +175,7 @@ fn other_numbers_for_the_same_patches_give_the_same_seams() {
 
 #[test]
 fn seams_run_from_triple_point_to_triple_point_or_around() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let surface = with_ctx(|ctx| segment(ctx, &SegmentationParams::default(), &solid, None)).unwrap();
     let seams = surface.seams();
     for seam in &seams {
@@ -223,7 +223,7 @@ fn a_box_of_twelve_triangles_keeps_its_six_sides() {
 
 #[test]
 fn both_halves_of_a_split_piece_are_connected_and_similar() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let (whole, halves) = with_ctx(|ctx| {
         let labels = user_labels(ctx, &SegmentationParams::default(), &solid, &arm_labels(&solid)).unwrap();
         let halves = split_piece(&solid, &labels, PatchId(0)).unwrap();
@@ -238,14 +238,14 @@ fn both_halves_of_a_split_piece_are_connected_and_similar() {
     assert!((one + two - area(&whole, 0)).abs() < 1e-9 && one.min(two) > 0.6 * one.max(two));
     let topology = Topology::new(&solid);
     assert_eq!(
-        FaceLabels::from_connected(&topology, halves.as_slice()).n_patches(),
+        FaceLabels::from_components(&topology, halves.as_slice()).n_patches(),
         halves.n_patches()
     );
 }
 
 #[test]
 fn labels_that_mean_no_patches_are_refused() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let n_faces = solid.mesh().triangles.len();
     let run =
         |labels: &[i64]| with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, labels));
@@ -269,7 +269,7 @@ fn labels_that_mean_no_patches_are_refused() {
 
 #[test]
 fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let mut labels = arm_labels(&solid);
     labels.iter_mut().filter(|l| **l == 100).for_each(|l| *l = -3);
     let is_lone = |l: &i64| *l == 7;
@@ -309,7 +309,7 @@ fn by(method: Method, solid: &Solid) -> FaceLabels {
 
 #[test]
 fn people_s_methods_make_a_part_of_each_arm() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let arm_of_face = arm_labels(&solid);
     for method in [Method::Auto, Method::RandomCuts, Method::Sdf] {
         let found = by(method, &solid);
@@ -340,13 +340,13 @@ fn a_ball_is_divided_by_every_method() {
         };
         let surface = with_ctx(|ctx| segment(ctx, &params, &ball, None)).unwrap();
         assert!(surface.n_patches >= 2, "{method:?}");
-        assert_eq!(Method::named(method.name()), Some(method));
+        assert_eq!(Method::by_name(method.name()), Some(method));
     }
 }
 
 #[test]
 fn of_a_limbed_body_few_enough_pieces_come_and_none_holds_others_alone() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let params = SegmentationParams {
         method: Method::Auto,
         ..SegmentationParams::default()
@@ -375,7 +375,7 @@ fn share_in_one_piece(surface: &SegmentedSurface, center_mm: [f64; 3], radius_mm
 
 #[test]
 fn what_is_kept_whole_ends_in_one_piece_by_every_method() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     // The end of an arm, a place on the body, and the root of an arm, where people would cut.
     for (at, radius_mm) in [
         ([-90.0, 0.0, 0.0], 25.0),
@@ -402,7 +402,7 @@ fn what_is_kept_whole_ends_in_one_piece_by_every_method() {
 
 #[test]
 fn no_division_parts_what_is_kept_whole() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let own: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
     let labels =
         with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &arm_labels(&solid)))
@@ -411,10 +411,10 @@ fn no_division_parts_what_is_kept_whole() {
         keep_whole: vec![ball([0.0, 0.0, -30.0], 25.0), ball([90.0, 0.0, 0.0], 20.0)],
         ..SegmentationParams::default()
     };
-    let ground = Ground::keeping(&params, &solid, &own);
+    let ground = Ground::with_regions(&params, &solid, &own);
     assert_eq!(ground.whole.sets().len(), 2);
     for patch in 0..labels.n_patches() {
-        let halves = split::split_keeping(&ground, &labels, PatchId::from(patch)).unwrap();
+        let halves = split::split_between_regions(&ground, &labels, PatchId::from(patch)).unwrap();
         let is_one = |set: &Vec<u32>| {
             set.iter()
                 .all(|&f| halves.patch(f as usize) == halves.patch(set[0] as usize))
@@ -425,7 +425,7 @@ fn no_division_parts_what_is_kept_whole() {
 
 #[test]
 fn a_region_across_labels_is_of_the_one_that_has_most_of_it() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let at = [44.0, 0.0, 0.0];
     let params = SegmentationParams {
         keep_whole: vec![ball(at, 14.0)],
@@ -444,7 +444,7 @@ fn a_region_across_labels_is_of_the_one_that_has_most_of_it() {
 
 #[test]
 fn a_label_that_is_kept_whole_stays_one_piece() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let labels = arm_labels(&solid);
     let params = SegmentationParams {
         keep_whole: vec![KeepWhole::Label(12)],
@@ -462,10 +462,12 @@ fn a_label_that_is_kept_whole_stays_one_piece() {
 
 #[test]
 fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let labels = arm_labels(&solid);
     let error = |region: KeepWhole, labels: Option<&[i64]>| {
-        resolved(&[region], &solid, labels).unwrap_err().to_string()
+        resolve_regions(&[region], &solid, labels)
+            .unwrap_err()
+            .to_string()
     };
     let outside = error(ball([500.0, 0.0, 0.0], 20.0), None);
     assert!(
@@ -485,7 +487,7 @@ fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
 /// The arms are nearly symmetric about x = 0, and about the plane between y and z.
 #[test]
 fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let notes = |method: Method| {
         let params = SegmentationParams {
             method,
@@ -515,7 +517,7 @@ fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
 
 #[test]
 fn pieces_of_a_symmetric_division_are_more_of_them_each_others_images() {
-    let solid = limbed();
+    let solid = sphere_with_arms();
     let share = |symmetric: bool| {
         let params = SegmentationParams {
             method: Method::Auto,

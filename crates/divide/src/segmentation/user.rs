@@ -55,11 +55,11 @@ pub fn user_labels(
         .iter()
         .map(|l| names.partition_point(|n| n < l) as u32)
         .collect();
-    let mut parts = Parts::new(solid.mesh(), &topology, &label);
+    let mut parts = LabelParts::new(solid.mesh(), &topology, &label);
     parts.merge_islands(ctx, params, &names);
     parts.merge_small(ctx, params, &names);
     // Parts are numbered by label already, so the patches follow the order of the labels.
-    let cleaned = FaceLabels::from_connected(&topology, &parts.part_of_face);
+    let cleaned = FaceLabels::from_components(&topology, &parts.part_of_face);
     if cleaned.n_patches() < 2 {
         return Err(SegmentationError::AllTooSmall {
             min_piece_mm2: params.min_piece_mm2,
@@ -69,7 +69,7 @@ pub fn user_labels(
 }
 
 /// Connected parts of labels, which may be merged.
-struct Parts<'a> {
+struct LabelParts<'a> {
     mesh: &'a TriMesh,
     topology: &'a Topology,
     /// The part of each triangle; changes when parts merge.
@@ -79,9 +79,9 @@ struct Parts<'a> {
     n_faces: Vec<usize>,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> LabelParts<'a> {
     fn new(mesh: &'a TriMesh, topology: &'a Topology, label_of_face: &[u32]) -> Self {
-        let parts = FaceLabels::from_connected(topology, label_of_face);
+        let parts = FaceLabels::from_components(topology, label_of_face);
         let n = parts.n_patches();
         let (mut label, mut area, mut n_faces) = (vec![0; n], vec![0.0; n], vec![0; n]);
         for (face, &p) in parts.as_slice().iter().enumerate() {

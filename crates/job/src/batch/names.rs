@@ -62,7 +62,7 @@ pub fn models(folder: &Path, out: Option<&Path>) -> Result<VecDeque<(PathBuf, Pa
             }
         }
     }
-    Ok(named(found))
+    Ok(name_kits(found))
 }
 
 fn is_model(name: &Path) -> bool {
@@ -77,7 +77,7 @@ fn is_kit(folder: &Path) -> bool {
 
 /// Assigns each model a unique kit name: unique ignoring case, and never the name of a folder that contains
 /// other kits.
-fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
+fn name_kits(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
     let lower = |name: &str| name.to_lowercase();
     let stem = |model: &Path| with_slashes(&model.with_extension(""));
     let mut stems: BTreeMap<String, usize> = BTreeMap::new();
@@ -224,7 +224,7 @@ mod tests {
     fn the_name_of_a_kit_has_slashes_between_its_parts_on_every_system() {
         for file in ["a.stl", "a.obj"] {
             let models = ["a.stl", file].map(|file| ["b", "c", file].iter().collect());
-            let kits = named(BTreeSet::from(models));
+            let kits = name_kits(BTreeSet::from(models));
             assert!(
                 kits.iter()
                     .all(|(_, kit)| kit.to_str().unwrap().starts_with("b/c/a")),

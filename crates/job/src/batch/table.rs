@@ -32,16 +32,16 @@ fn csv(records: &[Record]) -> String {
     for r in records {
         let number = |x: Option<f64>, digits: usize| x.map_or(String::new(), |x| format!("{x:.digits$}"));
         let fields = [
-            quoted(&r.model),
+            quote(&r.model),
             r.status.name().to_owned(),
-            quoted(&r.kit),
+            quote(&r.kit),
             r.pieces.map_or(String::new(), |n| n.to_string()),
             format!("{:.1}", r.seconds),
             number(r.peak_mb, 0),
             number(r.volume_ratio, 3),
             r.n_problems.to_string(),
             r.n_warnings.to_string(),
-            quoted(r.said.first().map_or("", |said| said)),
+            quote(r.said.first().map_or("", |said| said)),
         ];
         text += &fields.join(",");
         text.push('\n');
@@ -50,7 +50,7 @@ fn csv(records: &[Record]) -> String {
 }
 
 /// Quotes a field as in RFC 4180, with an apostrophe before text that spreadsheets would take for a formula.
-fn quoted(text: &str) -> String {
+fn quote(text: &str) -> String {
     let text = text.replace(['\n', '\r'], " ");
     let is_formula = text.starts_with(['=', '+', '-', '@']);
     let text = if is_formula { format!("'{text}") } else { text };
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn hostile_names_stay_text() {
-        assert_eq!(quoted("=1+\"a\"\nb"), "\"'=1+\"\"a\"\" b\"");
+        assert_eq!(quote("=1+\"a\"\nb"), "\"'=1+\"\"a\"\" b\"");
         assert_eq!(address("a b/\"><script>"), "a%20b/%22%3E%3Cscript%3E");
         assert_eq!(
             escape("<img src=x onerror=\"a\">"),

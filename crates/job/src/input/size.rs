@@ -67,12 +67,12 @@ pub(super) fn check_size(longest_mm: f64) -> Result<(), Failure> {
     }
     Err(Failure::Wrong(format!(
         "the longest side would be {} mm; it must lie between {least} and {most} mm: choose with --size",
-        rounded(longest_mm)
+        round_length(longest_mm)
     )))
 }
 
 /// Writes a length with at most three decimals, or in powers of ten if decimals say nothing.
-fn rounded(length: f64) -> String {
+fn round_length(length: f64) -> String {
     if (0.001..1e6).contains(&length) {
         format!("{}", (1000.0 * length).round() / 1000.0)
     } else {
@@ -112,11 +112,11 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
         ),
         Some(mm) => format!(
             "by the file's unit the longest side is {} mm, which is unusual",
-            rounded(mm * longest)
+            round_length(mm * longest)
         ),
         None => format!(
             "the file's longest side is {} units, which is unusual for millimetres",
-            rounded(longest)
+            round_length(longest)
         ),
     };
     let units = [

@@ -6,7 +6,7 @@ use shellock_mechanics::Material;
 use shellock_print::Printer;
 
 use super::{DECLARED, Declared, Kind, Options};
-use crate::build::checked;
+use crate::build::check_options;
 use crate::failure::Failure;
 
 /// Options that the choices leave out, because they name files.
@@ -30,7 +30,7 @@ pub enum Choice {
 pub type Choices = Vec<(String, Choice)>;
 
 /// Options that can be chosen by name.
-fn offered() -> impl Iterator<Item = &'static Declared> {
+fn options_to_choose() -> impl Iterator<Item = &'static Declared> {
     DECLARED.iter().filter(|option| !LEFT_OUT.contains(&option.name))
 }
 
@@ -97,7 +97,7 @@ pub fn offers(choices: &[(String, Choice)], own_printers: &[Printer]) -> Vec<Off
             value_name,
         }
     };
-    offered().map(offer).collect()
+    options_to_choose().map(offer).collect()
 }
 
 /// Possible values of an option where it has a fixed list; else empty.
@@ -120,22 +120,22 @@ fn known_values(option: &Declared, own_printers: &[Printer]) -> Vec<String> {
 
 /// Applies `changes` to `choices`. Each change is a value, or `null` to clear the choice. Refuses unknown
 /// names and values of the wrong kind.
-pub fn changed(choices: &[(String, Choice)], changes: &Map<String, Value>) -> Result<Choices, Failure> {
+pub fn apply_changes(choices: &[(String, Choice)], changes: &Map<String, Value>) -> Result<Choices, Failure> {
     let mut next = choices.to_vec();
     for (name, value) in changes {
-        let option = offered().find(|option| option.name == name);
+        let option = options_to_choose().find(|option| option.name == name);
         let option = option.ok_or_else(|| Failure::Wrong(format!("there is no option \"{name}\"")))?;
         next.retain(|(n, _)| n != name);
         next.extend(choice(option, value)?.map(|choice| (name.clone(), choice)));
     }
-    let place = |name: &str| offered().position(|option| option.name == name);
+    let place = |name: &str| options_to_choose().position(|option| option.name == name);
     next.sort_by_key(|(name, _)| place(name));
     Ok(next)
 }
 
 /// Replaces the labels in `choices` after a relabelling of the faces. Labels without a new one stay, and so
 /// does every value that is not a label, such as a place.
-pub fn relabelled(choices: &[(String, Choice)], new_label: impl Fn(i64) -> Option<i64>) -> Choices {
+pub fn relabel(choices: &[(String, Choice)], new_label: impl Fn(i64) -> Option<i64>) -> Choices {
     let relabel = |text: &String| {
         let label = text.trim().parse().ok();
         label
@@ -189,26 +189,26 @@ fn choice(option: &Declared, value: &Value) -> Result<Option<Choice>, Failure> {
 impl Options {
     /// Options by their names, each with a text, a number, a list of these, or `true` for a flag; refuses
     /// what is wrong with them.
-    pub fn named(values: &Map<String, Value>) -> Result<Self, Failure> {
-        Self::chosen(&changed(&[], values)?, &[])
+    pub fn from_names(values: &Map<String, Value>) -> Result<Self, Failure> {
+        Self::from_choices(&apply_changes(&[], values)?, &[])
     }
 
     /// Options that were chosen; refuses values that mean nothing, options that exclude each other, and
     /// whatever no kit could be made with.
-    pub fn chosen(choices: &[(String, Choice)], own_printers: &[Printer]) -> Result<Self, Failure> {
+    pub fn from_choices(choices: &[(String, Choice)], own_printers: &[Printer]) -> Result<Self, Failure> {
         let mut options = Self {
             own_printers: own_printers.to_vec(),
             ..Self::default()
         };
         let mut given = Vec::new();
         for (name, choice) in choices {
-            let option = super::declared(name)
+            let option = super::declaration(name)
                 .ok_or_else(|| Failure::Wrong(format!("there is no option \"{name}\"")))?;
             take(option, choice, &mut options).map_err(Failure::Wrong)?;
             given.push(option);
         }
         exclusion(&given).map_or(Ok(()), |words| Err(Failure::Wrong(words)))?;
-        checked(&options)?;
+        check_options(&options)?;
         Ok(options)
     }
 }
@@ -320,17 +320,17 @@ mod tests {
 
     #[test]
     fn what_is_chosen_means_the_same_as_on_the_command_line() {
-        let chosen = changed(
+        let chosen = apply_changes(
             &[],
             &changes(r#"{"size":"15cm","key-grip":true,"keep-whole":["0,0,9,5"],"key":"1,2,3"}"#),
         )
         .unwrap();
-        let options = Options::chosen(&chosen, &[]).unwrap();
+        let options = Options::from_choices(&chosen, &[]).unwrap();
         assert_eq!(
             (options.size, options.key_grip, options.keep_whole.len()),
             (Some(150.0), true, 1)
         );
-        let without = changed(
+        let without = apply_changes(
             &chosen,
             &changes(r#"{"size":null,"key-grip":false,"keep-whole":[]}"#),
         )
@@ -341,22 +341,25 @@ mod tests {
     #[test]
     fn labels_that_options_name_are_replaced_and_nothing_else() {
         let chosen = changes(r#"{"pieces":"2","key":"2","keep-whole":["2","5","2,2,2,2"],"seed":"2"}"#);
-        let chosen = changed(&[], &chosen).unwrap();
+        let chosen = apply_changes(&[], &chosen).unwrap();
         let new_label = |label: i64| (label == 2).then_some(7);
         let expected = changes(r#"{"pieces":"2","key":"7","keep-whole":["7","5","2,2,2,2"],"seed":"2"}"#);
-        assert_eq!(relabelled(&chosen, new_label), changed(&[], &expected).unwrap());
+        assert_eq!(
+            relabel(&chosen, new_label),
+            apply_changes(&[], &expected).unwrap()
+        );
         for key in ["auto", "piece", "1,2,3"] {
             let chosen = vec![("key".to_owned(), Choice::Text(key.to_owned()))];
-            assert_eq!(relabelled(&chosen, |_| Some(7)), chosen);
+            assert_eq!(relabel(&chosen, |_| Some(7)), chosen);
         }
     }
 
     #[test]
     fn what_is_wrong_is_refused_in_words() {
         let refused = |text: &str| {
-            let chosen = changed(&[], &changes(text));
+            let chosen = apply_changes(&[], &changes(text));
             chosen
-                .and_then(|c| Options::chosen(&c, &[]).map(|_| ()))
+                .and_then(|c| Options::from_choices(&c, &[]).map(|_| ()))
                 .unwrap_err()
                 .to_string()
         };

@@ -106,7 +106,7 @@ impl Declared {
         }
     }
 
-    const fn advanced(self) -> Self {
+    const fn mark_advanced(self) -> Self {
         Self {
             is_advanced: true,
             ..self
@@ -206,7 +206,7 @@ const fn path(
 }
 
 /// Finds the declaration of the option `name`.
-pub fn declared(name: &str) -> Option<&'static Declared> {
+pub fn declaration(name: &str) -> Option<&'static Declared> {
     DECLARED.iter().find(|option| option.name == name)
 }
 
@@ -243,7 +243,7 @@ pub const DECLARED: &[Declared] = &[
     text(SIZE, "scale", "F", |o, t| number(t).map(|v| o.scale = Some(v)))
         .help("Millimetres a file unit", "Millimetres a file unit")
         .with_hyphens()
-        .advanced(),
+        .mark_advanced(),
     choice::<Unit>(SIZE, "unit", "UNIT", |o, t| word(t).map(|v| o.unit = Some(v)))
         .help(
             "Unit of the file: micron, mm, cm, inch, foot or m",
@@ -274,13 +274,13 @@ pub const DECLARED: &[Declared] = &[
         "Make one plate of a slicer's project",
         "Which plate of a slicer's project is made, by its number or its name",
     )
-    .advanced(),
+    .mark_advanced(),
     flag(SURFACE, "no-repair", |o| o.no_repair = true)
         .help(
             "Refuse a surface that needs repair",
             "Refuse a surface that needs repair instead of mending it",
         )
-        .advanced()
+        .mark_advanced()
         .not_with(&["largest"]),
     flag(SURFACE, "largest", |o| o.largest = true).help(
         "Make only the largest of several bodies",
@@ -292,7 +292,7 @@ pub const DECLARED: &[Declared] = &[
             "Close the openings of a model that is hollow already, as slicers for resin make it, and \
              make the solid figure of it",
         )
-        .advanced(),
+        .mark_advanced(),
     choice::<InsideOutMeans>(SURFACE, "inside-out", "ask|cut|unite", |o, t| {
         word(t).map(|v| o.inside_out = v)
     })
@@ -302,7 +302,7 @@ pub const DECLARED: &[Declared] = &[
              and the body's place is named; cut, it is a hole; unite, it is a part",
     )
     .default("ask")
-    .advanced(),
+    .mark_advanced(),
     text(SURFACE, "resolution", "MM", |o, t| {
         length_mm(t).map(|v| o.resolution = v)
     })
@@ -313,7 +313,7 @@ pub const DECLARED: &[Declared] = &[
     )
     .default("0.015")
     .with_hyphens()
-    .advanced(),
+    .mark_advanced(),
     path(PIECES, "labels", "FILE", |o, path| o.labels = Some(path)).help(
         "One label a face: a .seg or .ply file",
         "One label a face: a .seg file (one integer a line) or a .ply with a face property; a \
@@ -406,7 +406,7 @@ pub const DECLARED: &[Declared] = &[
     )
     .default("10")
     .with_hyphens()
-    .advanced(),
+    .mark_advanced(),
     text(MAKE, "thickness", "auto|MM", |o, t| {
         t.parse().map(|v| o.thickness = v)
     })
@@ -459,7 +459,7 @@ pub const DECLARED: &[Declared] = &[
         "Gap between mating faces of the key's rails, mm, 0.03 to 0.8 [default: the printer's]",
     )
     .with_hyphens()
-    .advanced(),
+    .mark_advanced(),
     text(MAKE, "detent", "MM", |o, t| length_mm(t).map(|v| o.detent = v))
         .help(
             "Bump that the key clicks past, 0 to 0.4 mm",
@@ -467,7 +467,7 @@ pub const DECLARED: &[Declared] = &[
         )
         .default("0")
         .with_hyphens()
-        .advanced(),
+        .mark_advanced(),
     text(MAKE, "key-ribs", "MM", |o, t| {
         length_mm(t).map(|v| o.key_ribs = v)
     })
@@ -478,14 +478,14 @@ pub const DECLARED: &[Declared] = &[
     )
     .default("0.08")
     .with_hyphens()
-    .advanced(),
+    .mark_advanced(),
     flag(MAKE, "play-together", |o| o.play_together = true)
         .help(
             "Also prove how far pieces move all together",
             "Also look for a proof of how far pieces move within the gaps while all others but one \
              move too; closes for small kits only, and takes some seconds to a minute",
         )
-        .advanced(),
+        .mark_advanced(),
     flag(MAKE, "allow-thin", |o| o.allow_thin = true).help(
         "Make pieces though hardly anything can be hollow",
         "Make pieces though hardly anything of the model can be hollow; they are mostly solid, \
@@ -515,7 +515,7 @@ pub const DECLARED: &[Declared] = &[
              the printer's tolerance]",
     )
     .with_hyphens()
-    .advanced()
+    .mark_advanced()
     .alias("wall-gap"),
     text(MAKE, "min-wall", "MM", |o, t| {
         length_mm(t).map(|v| o.min_wall = Some(v))
@@ -526,14 +526,14 @@ pub const DECLARED: &[Declared] = &[
              [default: the printer's]",
     )
     .with_hyphens()
-    .advanced(),
+    .mark_advanced(),
     text(MAKE, "grid", "MM", |o, t| length_mm(t).map(|v| o.grid = Some(v)))
         .help(
             "Spacing of the grid behind the walls, mm",
             "Spacing of the grid behind the walls, mm [default: thickness / 2.5]",
         )
         .with_hyphens()
-        .advanced(),
+        .mark_advanced(),
     text(MAKE, "seed", "N", |o, t| number(t).map(|v| o.seed = v))
         .help(
             "Seed of all random choices",

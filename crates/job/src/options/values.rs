@@ -163,7 +163,7 @@ pub enum InsideOutMeans {
 
 impl InsideOutMeans {
     /// Returns the library's value for this choice.
-    pub fn meant(self) -> InsideOut {
+    pub fn value(self) -> InsideOut {
         match self {
             Self::Ask => InsideOut::Ask,
             Self::Cut => InsideOut::Cut,
@@ -281,7 +281,7 @@ pub fn material(name: &str) -> Result<Material, String> {
 }
 
 /// Finds a printer by name, in any case: one of the user's `own`, or one that comes with the program.
-pub fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
+pub fn find_printer(name: &str, own: &[Printer]) -> Result<Printer, String> {
     let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
     let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
     let names: Vec<&str> = known.iter().map(|p| p.name.as_str()).collect();

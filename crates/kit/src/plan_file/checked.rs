@@ -109,7 +109,7 @@ impl PlanFile {
     /// Returns the wall thickness, mm; an error if the file lacks it.
     pub fn thickness_mm(&self) -> Result<f64, PlanFileError> {
         self.shell_thickness
-            .ok_or_else(|| PlanFileError::missing("shell_thickness"))
+            .ok_or_else(|| PlanFileError::missing_field("shell_thickness"))
     }
 
     /// Returns the connector sizes: one for all pairs, or those of each pair.
@@ -118,7 +118,7 @@ impl PlanFile {
     pub fn sizes(&self) -> Result<ConnectorSizes, PlanFileError> {
         let default_mm = self
             .connector_size
-            .ok_or_else(|| PlanFileError::missing("connector_size"))?;
+            .ok_or_else(|| PlanFileError::missing_field("connector_size"))?;
         let Some(sizes) = &self.connector_sizes else {
             return Ok(ConnectorSizes::uniform(default_mm));
         };

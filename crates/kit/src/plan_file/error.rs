@@ -43,7 +43,7 @@ pub enum PlanFileError {
 
 impl PlanFileError {
     /// Error for a missing field.
-    pub(super) fn missing(field: &str) -> Self {
+    pub(super) fn missing_field(field: &str) -> Self {
         Self::Missing {
             field: field.to_owned(),
         }

@@ -152,7 +152,7 @@ fn joints(design: &Design) -> Vec<JointEntry> {
             female: j.female,
             length_mm: j.length_mm,
             volume_mm3: j.volume_mm3,
-            kept: j.kept,
+            kept: j.intact_share,
             at: j.at.to_array(),
         })
         .collect()
@@ -199,7 +199,7 @@ impl RepairEntry {
 
 impl StrengthEntry {
     fn of(strength: &Strength, settings: &Settings) -> Self {
-        let tried = strength.tried.iter().map(|t| TriedEntry {
+        let tried = strength.trials.iter().map(|t| TriedEntry {
             thickness_mm: t.thickness_mm,
             stress_mpa: t.stress_mpa,
         });
@@ -214,8 +214,8 @@ impl StrengthEntry {
             stress_mpa: strength.stress_mpa,
             is_too_weak: strength.is_too_weak,
             at: strength.at.to_array(),
-            deciding_fall: strength.deciding.0 + 1,
-            down: strength.deciding.1.to_array(),
+            deciding_fall: strength.decisive_fall.0 + 1,
+            down: strength.decisive_fall.1.to_array(),
             tried: tried.collect(),
             solid: solid.collect(),
         }

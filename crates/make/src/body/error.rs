@@ -7,14 +7,14 @@ use shellock_report::PatchId;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BodyError {
     /// Most of a piece lies behind other pieces on its way out, so it would have to leave that part behind.
-    #[error("piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)]
+    #[error("piece {piece} could take only {:.0} % of its wall along", 100.0 * free_share)]
     Blocked {
         /// The piece that is blocked.
         piece: PatchId,
         /// The direction in which it was to leave.
         separation: LatticeDirection,
         /// Share of the piece's wall that is free to leave, in [0, 1].
-        kept: f64,
+        free_share: f64,
     },
     /// The user asked to stop.
     #[error(transparent)]

@@ -37,29 +37,32 @@ impl<'a> Fragments<'a> {
         let (lost, gained) = rayon::join(|| fragments(1.0), || fragments(-1.0));
         lost.iter().for_each(|&n| g[n as usize] = -away_mm);
         gained.iter().for_each(|&n| g[n as usize] = away_mm);
-        (!lost.is_empty() || !gained.is_empty()).then_some(Given { gained, away_mm })
+        (!lost.is_empty() || !gained.is_empty()).then_some(Given {
+            gains: gained,
+            away_mm,
+        })
     }
 }
 
 /// Fragments that have changed sides.
 pub(super) struct Given {
     /// Nodes of fragments that went to the piece that is cut off.
-    gained: Vec<u32>,
+    gains: Vec<u32>,
     away_mm: f32,
 }
 
 impl Given {
     /// Field that is positive in the fragments the piece got, and up to a cell beyond them; `None` where it
     /// got none.
-    pub fn gained(&self, grid: &ShellGrid) -> Option<Vec<f32>> {
+    pub fn gain_field(&self, grid: &ShellGrid) -> Option<Vec<f32>> {
         let mut field = vec![-grid.cutoff_mm(); grid.band.len()];
-        for &n in &self.gained {
+        for &n in &self.gains {
             field[n as usize] = self.away_mm;
             for m in grid.joined_neighbours(n) {
                 field[m as usize] = self.away_mm;
             }
         }
-        (!self.gained.is_empty()).then_some(field)
+        (!self.gains.is_empty()).then_some(field)
     }
 }
 

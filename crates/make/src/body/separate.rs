@@ -57,7 +57,7 @@ pub struct ShellBodies {
     pub inner: Option<SegmentedSurface>,
     /// Field that is positive where a piece may have no connectors: where bodies block its way out, or where
     /// it would block a later piece's way. On the nodes around its patch.
-    pub blocked: IdVec<PatchId, LocalField>,
+    pub keep_out: IdVec<PatchId, LocalField>,
     /// Field that is positive on each piece's own side of all cuts. Together with the wall's limits it bounds
     /// the body. On the nodes around its patch.
     pub side: IdVec<PatchId, LocalField>,
@@ -97,7 +97,7 @@ pub fn build(
     Ok(ShellBodies {
         bodies: parts.into_iter().map(|(_, body)| body).collect(),
         inner: separated.inner,
-        blocked: of_every_piece(separated.blocked),
+        keep_out: of_every_piece(separated.keep_out),
         side: of_every_piece(separated.side),
         gap_mm,
     })
@@ -110,7 +110,7 @@ struct Separated {
     /// Inner surface of the wall with its pieces, if there is a cavity.
     inner: Option<SegmentedSurface>,
     /// Region that each piece must keep free, and the region on its side of the cuts.
-    blocked: Vec<Option<LocalField>>,
+    keep_out: Vec<Option<LocalField>>,
     side: Vec<Option<LocalField>>,
 }
 
@@ -145,7 +145,7 @@ fn separate(
                 return Err(BodyError::Blocked {
                     piece: p,
                     separation: step.separation,
-                    kept,
+                    free_share: kept,
                 });
             }
             let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
@@ -168,7 +168,7 @@ fn separate(
     Ok(Separated {
         cuts,
         inner: inner.finish(plan.steps.len()),
-        blocked,
+        keep_out: blocked,
         side,
     })
 }
@@ -246,7 +246,7 @@ impl Splitter<'_> {
             apart,
         );
         let collar =
-            Volume::from_closed_mesh(&self.simplified(collar, g, sign)).expect("contours are manifold");
+            Volume::from_closed_mesh(&self.simplify_collar(collar, g, sign)).expect("contours are manifold");
         self.half(&wall.subtract(&collar), g, sign)
             .unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
     }
@@ -298,7 +298,7 @@ impl Splitter<'_> {
         (self.grid.thickness_mm as f32 + reach - depth).min(depth + reach) * LIMIT_SLOPE
     }
 
-    fn simplified(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
+    fn simplify_collar(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
         let h = |p: Vec3| self.grid.band.sample(g, p).map_or(0.0, |g| f64::from(sign) * g);
         let tolerance: Vec<f64> = collar
             .points
@@ -439,7 +439,7 @@ impl<'a> Separation<'a> {
             let Some(given) = self.fragments.give(&mut g, &self.rest) else {
                 break;
             };
-            if let Some(mut gained) = given.gained(self.grid) {
+            if let Some(mut gained) = given.gain_field(self.grid) {
                 gained
                     .par_iter_mut()
                     .enumerate()

@@ -76,7 +76,7 @@ impl Sheets {
         nodes: &[u32],
         foot: impl Fn(Vec3) -> Option<Vec3> + Sync,
     ) -> Self {
-        let samples: Vec<Sample> = surface.seams().iter().flat_map(sampled).collect();
+        let samples: Vec<Sample> = surface.seams().iter().flat_map(sample_seam).collect();
         let reach_mm = REACH_CELLS * grid.band.cell_mm();
         let near = Buckets::new(&samples, reach_mm);
         let feet = nodes
@@ -116,7 +116,7 @@ impl Sheets {
                     [other, right] if right == p && remains[usize::from(other)] => -1.0,
                     _ => return None,
                 };
-                Some((sample.point, sample.leaning(towards, s)))
+                Some((sample.point, sample.sheet_normal(towards, s)))
             })
             .collect();
         let near = Buckets::over(planes.iter().map(|p| p.0), self.reach_mm);
@@ -167,7 +167,7 @@ fn mean_distance(
 impl Sample {
     /// Unit normal of the sample's sheet, into the patch to the left (`towards` 1) or to the right (−1). The
     /// sheet leans so that a piece that leaves along `s` does not rub.
-    fn leaning(&self, towards: f64, s: Vec3) -> Vec3 {
+    fn sheet_normal(&self, towards: f64, s: Vec3) -> Vec3 {
         let b = towards * self.normal.cross(self.tangent).normalize_or_zero();
         let across = s - s.dot(self.tangent) * self.tangent;
         let must = ((across.length() - ALONG[0]) / (ALONG[1] - ALONG[0])).clamp(0.0, 1.0);
@@ -186,7 +186,7 @@ impl Sample {
 }
 
 /// Samples a seam, with smoothed frames.
-fn sampled(seam: &shellock_surface::Seam) -> Vec<Sample> {
+fn sample_seam(seam: &shellock_surface::Seam) -> Vec<Sample> {
     let n = (seam.length() / STEP_MM).ceil().max(1.0) as usize;
     let stations = seam.resample(n);
     let is_loop = seam.is_loop();
@@ -289,7 +289,7 @@ mod tests {
         for degrees in (-140i32..=140).step_by(5) {
             let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
             let s = Vec3::new(0.3, cos, sin).normalize();
-            let b = sample.leaning(1.0, s);
+            let b = sample.sheet_normal(1.0, s);
             let across = Vec3::new(0.0, s.y, s.z);
             assert!(
                 b.dot(across) >= across.length() * DRAFT.sin() - 1e-9,
@@ -301,14 +301,14 @@ mod tests {
                 assert!((b.dot(across) - across.length() * DRAFT.sin()).abs() < 1e-9);
             }
         }
-        assert!((sample.leaning(-1.0, -Vec3::Y) + Vec3::Y).length() < 1e-12);
-        assert!((sample.leaning(1.0, Vec3::X) - Vec3::Y).length() < 1e-12);
+        assert!((sample.sheet_normal(-1.0, -Vec3::Y) + Vec3::Y).length() < 1e-12);
+        assert!((sample.sheet_normal(1.0, Vec3::X) - Vec3::Y).length() < 1e-12);
     }
 
     #[test]
     fn around_a_straight_seam_the_field_is_the_distance_to_its_sheet_at_any_depth() {
         let planes: Vec<(Vec3, Vec3)> = (-20..=20)
-            .map(|i| (0.3 * f64::from(i) * Vec3::X, sample().leaning(1.0, Vec3::Y)))
+            .map(|i| (0.3 * f64::from(i) * Vec3::X, sample().sheet_normal(1.0, Vec3::Y)))
             .collect();
         for (y, depth) in [(0.0, 0.0), (0.4, 1.0), (-1.1, 2.0), (1.9, 0.3)] {
             let x = Vec3::new(0.17, y, -depth);

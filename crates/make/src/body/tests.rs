@@ -27,7 +27,7 @@ fn octants() -> (SegmentedSurface, LatticePlan) {
     )
 }
 
-fn built(
+fn make_bodies(
     params: &BodyParams,
     surface: &SegmentedSurface,
     plan: &LatticePlan,
@@ -67,7 +67,7 @@ fn assert_leave_freely(bodies: &IdVec<shellock_report::PatchId, Volume>, plan: &
 #[test]
 fn bodies_part_the_wall_and_leave_freely() {
     let (surface, plan) = octants();
-    let (grid, built) = built(&BodyParams::default(), &surface, &plan);
+    let (grid, built) = make_bodies(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     let total: f64 = bodies.as_slice().iter().map(Volume::volume).sum();
     // Twelve seams of a quarter circle with two gaps each, 0.05 mm wide over 2 mm. Pieces keep out of each
@@ -85,7 +85,7 @@ fn bodies_part_the_wall_and_leave_freely() {
 #[test]
 fn cut_faces_stand_straight_under_their_seams_at_the_gap_from_them() {
     let (surface, plan) = octants();
-    let (_, built) = built(&BodyParams::default(), &surface, &plan);
+    let (_, built) = make_bodies(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     let (mut n_points, mut worst) = (0, 0.0f64);
     for body in bodies.as_slice() {
@@ -117,7 +117,7 @@ fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
         .collect();
     faces.iter().for_each(|&f| surface.patch_of_face[f] = plan.key());
     assert!(faces.len() > 20);
-    let (_, built) = built(&BodyParams::default(), &surface, &plan);
+    let (_, built) = make_bodies(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     assert!(bodies.as_slice().iter().all(|b| b.components().len() == 1));
     // The octant around the island got it: the first octant is as large as the others, except for what
@@ -131,8 +131,13 @@ fn a_piece_that_would_leave_through_the_others_is_told() {
     let (surface, mut plan) = octants();
     let key = plan.steps.len() - 1;
     plan.steps[key].separation = plan.steps[key].separation.opposite();
-    let (_, built) = built(&BodyParams::default(), &surface, &plan);
-    let Err(BodyError::Blocked { piece, kept, .. }) = built else {
+    let (_, built) = make_bodies(&BodyParams::default(), &surface, &plan);
+    let Err(BodyError::Blocked {
+        piece,
+        free_share: kept,
+        ..
+    }) = built
+    else {
         panic!("it was built")
     };
     assert_eq!(piece, plan.key());
@@ -189,7 +194,7 @@ fn a_crack_thinner_than_a_cell_parts_the_nodes_on_its_sides() {
 fn what_came_off_a_body_with_skin_goes_to_the_body_beside_it() {
     let (surface, plan) = octants();
     let params = BodyParams::default();
-    let (grid, built) = built(&params, &surface, &plan);
+    let (grid, built) = make_bodies(&params, &surface, &plan);
     let mut parts: Vec<(shellock_report::PatchId, Volume)> = Vec::new();
     for (i, body) in built.unwrap().bodies.as_slice().iter().enumerate() {
         parts.push((i.into(), body.clone()));

@@ -15,7 +15,7 @@ pub fn is_unobstructed<'a>(
     shell: &ShellBodies,
 ) -> impl Fn(PatchId, Vec3) -> Option<bool> + use<'a> {
     let blocked: Vec<Vec<f32>> = shell
-        .blocked
+        .keep_out
         .as_slice()
         .par_iter()
         .map(|b| b.spread(&grid.band, grid.cutoff_mm()))

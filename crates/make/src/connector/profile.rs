@@ -8,7 +8,7 @@ use super::{ConnectorParams, RunShape, RunStation};
 
 /// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct ProfileRect {
     /// Least coordinate along `n`, mm.
     pub n0: f64,
     /// Greatest coordinate along `n`, mm.
@@ -19,7 +19,7 @@ pub struct Part {
     pub s1: f64,
 }
 
-impl Part {
+impl ProfileRect {
     /// The rectangle with all sides moved outwards by `by_mm`.
     pub fn grown(self, by_mm: f64) -> Self {
         Self {
@@ -46,12 +46,12 @@ impl Part {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
     /// Pin below the seam; then, where the male leaves sideways, the foot that joins it to its body.
-    pub male: [Option<Part>; 2],
+    pub male: [Option<ProfileRect>; 2],
     /// Bottom, far wall and near wall of the channel.
-    pub female: [Option<Part>; 3],
+    pub female: [Option<ProfileRect>; 3],
     /// Filling of the corner between a tongue and the edge of the wall that it hangs from, a slot as narrow
     /// as the clearance. Reaches beyond the wall's side of the seam.
-    pub corner: Option<Part>,
+    pub corner: Option<ProfileRect>,
 }
 
 /// Angle between ŝ and the surface normal below which the pin is a tongue and needs a foot, rad: −40°.
@@ -99,7 +99,7 @@ impl Section {
         };
         let has_tongue = part != RailPart::Stop;
         let outer = reach + c + wall;
-        let tongue = Part {
+        let tongue = ProfileRect {
             n0: -reach,
             n1: reach - lead,
             s0: -c - thick + lead,
@@ -108,7 +108,7 @@ impl Section {
         Self {
             male: [
                 has_tongue.then_some(tongue),
-                has_tongue.then_some(Part {
+                has_tongue.then_some(ProfileRect {
                     n0: -reach,
                     n1: -c,
                     s0: tongue.s0,
@@ -116,19 +116,19 @@ impl Section {
                 }),
             ],
             female: [
-                Some(Part {
+                Some(ProfileRect {
                     n0: LIP_GAP_MM,
                     n1: outer,
                     s0: floor,
                     s1: -2.0 * c - thick,
                 }),
-                Some(Part {
+                Some(ProfileRect {
                     n0: reach + c,
                     n1: outer,
                     s0: floor,
                     s1: RAIL_ROOT_MM,
                 }),
-                (!has_tongue).then_some(Part {
+                (!has_tongue).then_some(ProfileRect {
                     n0: LIP_GAP_MM,
                     n1: outer,
                     s0: floor,
@@ -163,20 +163,20 @@ impl Section {
         let (c_s, floor) = (c * k, -pin_depth - c * k - bottom * k);
         let far = -pin_width - c - wall;
         Self {
-            corner: is_tongue.then_some(Part {
+            corner: is_tongue.then_some(ProfileRect {
                 n0: -c - CORNER_MM,
                 n1: CORNER_MM,
                 s0: -c,
                 s1: top_male.min(ROOT_MM),
             }),
             male: [
-                Some(Part {
+                Some(ProfileRect {
                     n0: -pin_width,
                     n1: -c,
                     s0: -pin_depth,
                     s1: top_male,
                 }),
-                is_tongue.then_some(Part {
+                is_tongue.then_some(ProfileRect {
                     n0: -pin_width,
                     n1: ROOT_MM,
                     s0: 0.5 * c,
@@ -184,19 +184,19 @@ impl Section {
                 }),
             ],
             female: [
-                Some(Part {
+                Some(ProfileRect {
                     n0: far,
                     n1: foot_width,
                     s0: floor,
                     s1: -pin_depth - c_s,
                 }),
-                Some(Part {
+                Some(ProfileRect {
                     n0: far,
                     n1: -pin_width - c,
                     s0: floor,
                     s1: -lean * k - c_s,
                 }),
-                Some(Part {
+                Some(ProfileRect {
                     n0: 0.0,
                     n1: foot_width,
                     s0: floor,

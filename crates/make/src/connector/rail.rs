@@ -122,7 +122,7 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
         if rest.len() < 3 || length < SHORTEST_RAIL_SIZES * size_mm {
             return None;
         }
-        let (middle, slope) = fitted(rest);
+        let (middle, slope) = fit_line(rest);
         let aside = |p: &Place| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs();
         let front = rest[rest.len() - 1][0];
         let near_seam = |p: &&Place| (p[1] - middle_of(rest)).abs() < REACH_SIZES * size_mm;
@@ -156,7 +156,7 @@ fn middle_of(places: &[Place]) -> f64 {
 }
 
 /// Centre of the places, and slope towards the key of the least-squares line through them.
-fn fitted(places: &[Place]) -> (Place, f64) {
+fn fit_line(places: &[Place]) -> (Place, f64) {
     let n = places.len() as f64;
     let middle: Place = std::array::from_fn(|axis| places.iter().map(|p| p[axis]).sum::<f64>() / n);
     let (mut across, mut along) = (0.0, 0.0);

@@ -139,7 +139,7 @@ pub fn runs(
             ..station(curve, i, separation, later_is_male[i], size_mm)
         };
         let stations: Vec<RunStation> = (0..curve.points.len()).map(at).collect();
-        let mut allowed = allowed(size_mm, curve, &stations, &later_is_male);
+        let mut allowed = connector_mask(size_mm, curve, &stations, &later_is_male);
         let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
         contacts.push(SeamRoom {
             later: curve.later,
@@ -165,7 +165,7 @@ pub fn runs(
             allowed[i] = allowed[i] && has_room(params, &stations[i], male, female, is_free);
         }
         for (from, to) in stretches(&allowed, &later_is_male) {
-            let run = thinned(&stations[from..=to]);
+            let run = thin_out(&stations[from..=to]);
             let (male, female) = sides(curve, later_is_male[from]);
             if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN_SIZES * size_mm {
                 runs.push(Run {
@@ -225,7 +225,7 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
 }
 
 /// True at the points where ends, roles, angles and turns allow a connector.
-fn allowed(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is_male: &[bool]) -> Vec<bool> {
+fn connector_mask(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is_male: &[bool]) -> Vec<bool> {
     let n = stations.len();
     let length = stations[n - 1].arc_mm;
     let end = end_gap_mm(size_mm, length);
@@ -254,7 +254,8 @@ pub(super) fn has_room(
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
 ) -> bool {
     let section = Section::at(params, station);
-    let halves: [(PatchId, &[Option<super::Part>]); 2] = [(male, &section.male), (female, &section.female)];
+    let halves: [(PatchId, &[Option<super::ProfileRect>]); 2] =
+        [(male, &section.male), (female, &section.female)];
     halves.iter().all(|(piece, parts)| {
         let (mut free, mut all) = (0.0, 0.0);
         for part in parts.iter().flatten() {
@@ -289,7 +290,7 @@ fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
 }
 
 /// Selects as few stations as possible whose cells keep the limits of sag, turn and length.
-fn thinned(stations: &[RunStation]) -> Vec<RunStation> {
+fn thin_out(stations: &[RunStation]) -> Vec<RunStation> {
     let mut kept = vec![stations[0]];
     let mut from = 0;
     for to in 2..stations.len() {

@@ -5,7 +5,7 @@ use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Vec3, Volume};
 use shellock_report::PatchId;
 
-use crate::connector::{ConnectorParams, Part, Run, RunStation, Section};
+use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section};
 
 /// Difference between the clearance and the growth of the socket, mm. The channel's section already keeps the
 /// clearance; the difference keeps faces from coinciding.
@@ -49,7 +49,7 @@ fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
             };
             parts
                 .into_iter()
-                .map(|part: Option<Part>| part.map(|p| p.grown(grown_mm).corners(&moved)))
+                .map(|part: Option<ProfileRect>| part.map(|p| p.grown(grown_mm).corners(&moved)))
                 .collect()
         })
         .collect()
@@ -156,7 +156,7 @@ pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm:
 }
 
 /// Subtracts from `volume` all that the `swept_volumes` sweep through it.
-pub(super) fn carved<'a>(
+pub(super) fn subtract_sweeps<'a>(
     volume: &Volume,
     swept_volumes: impl IntoIterator<Item = &'a SweptVolume>,
     far_mm: f64,

@@ -12,7 +12,7 @@ use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
 use shellock_surface::Turn;
 
-use super::carve::{Half, SweptVolume, carved, whole_half};
+use super::carve::{Half, SweptVolume, subtract_sweeps, whole_half};
 use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
@@ -41,7 +41,7 @@ pub struct FinishedJoint {
     /// Volume of the pin and of the channel below the wall, mm³, after carving.
     pub volume_mm3: [f64; 2],
     /// Share of each half that survived the carving, in [0, 1].
-    pub kept: [f64; 2],
+    pub intact_share: [f64; 2],
     /// Middle of the run.
     pub at: Vec3,
     /// True if the run is a rail of the key.
@@ -94,7 +94,7 @@ pub struct FinishParams<'a> {
 #[derive(Clone)]
 struct Halves {
     raw: [f64; 2],
-    carved: [Volume; 2],
+    shapes: [Volume; 2],
 }
 
 /// Carves every half connector in the disassembly sequence and joins it to its body. Cuts off what comes too
@@ -123,7 +123,7 @@ pub fn make(
         .map(|(r, _)| r.clone())
         .collect();
     ctx.stage("pieces", plan.steps.len())?;
-    let mut pieces = joined(shell, &joints, &halves);
+    let mut pieces = unite(shell, &joints, &halves);
     let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
     relieve(ctx, &finish.relief, plan, &mut pieces)?;
     thin::shave(ctx, params.min_wall_mm, &depth, &mut pieces)?;
@@ -140,7 +140,7 @@ pub fn make(
         changes.extend(added);
     }
     Ok(Finished {
-        meshes: printed(ctx, finish, grid, plan, &pieces, &changes)?,
+        meshes: make_printable(ctx, finish, grid, plan, &pieces, &changes)?,
         joints,
         press_fits,
     })
@@ -160,7 +160,7 @@ fn carved_halves(
     let mut halves = vec![
         Halves {
             raw: [0.0; 2],
-            carved: [Volume::empty(), Volume::empty()]
+            shapes: [Volume::empty(), Volume::empty()]
         };
         runs.len()
     ];
@@ -185,20 +185,20 @@ fn carved_halves(
         let carve = |(&(r, h), whole): (&(usize, usize), &Volume)| {
             let free = room.cut(whole);
             if h == 1 {
-                return (whole.volume(), carved(&free, &swept_volumes, far_mm));
+                return (whole.volume(), subtract_sweeps(&free, &swept_volumes, far_mm));
             }
             // A corner ends where its wall does. The field of obstructions is too coarse there, and the other
             // wall's way, with the clearance of connectors around it, too wide.
             let is_partner = |w: &&SweptVolume| w.piece == runs[r].female;
-            let pin = carved(&free, swept_volumes.iter().filter(is_partner), far_mm);
+            let pin = subtract_sweeps(&free, swept_volumes.iter().filter(is_partner), far_mm);
             let half = pin.union(&room.corner(params, &runs[r]));
             let strangers = swept_volumes.iter().filter(|w| !is_partner(w));
-            (whole.volume(), carved(&half, strangers, far_mm))
+            (whole.volume(), subtract_sweeps(&half, strangers, far_mm))
         };
         let made: Vec<(f64, Volume)> = mine.par_iter().zip(&whole).map(carve).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
-            halves[r].carved[h] = volume;
+            halves[r].shapes[h] = volume;
         }
         swept_volumes.push(SweptVolume::of(params, runs, q, step.separation));
         ctx.step()?;
@@ -226,7 +226,7 @@ struct Room<'a> {
     /// Distance that the piece keeps from the cuts, mm, on all nodes.
     gap_mm: &'a [f32],
     /// Field that is positive where the piece may not be: in its way out or in a later piece's.
-    blocked: Vec<f32>,
+    keep_out: Vec<f32>,
     /// Field that is positive on the piece's own side of the cuts.
     side: Vec<f32>,
 }
@@ -235,14 +235,14 @@ impl<'a> Room<'a> {
     fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &'a ShellBodies, q: PatchId) -> Self {
         let cutoff = grid.cutoff_mm();
         let (blocked, side) = rayon::join(
-            || shell.blocked[q].spread(&grid.band, cutoff),
+            || shell.keep_out[q].spread(&grid.band, cutoff),
             || shell.side[q].spread(&grid.band, -cutoff),
         );
         Self {
             grid,
             clearance_mm: clearance_mm as f32,
             gap_mm: &shell.gap_mm,
-            blocked,
+            keep_out: blocked,
             side,
         }
     }
@@ -301,7 +301,7 @@ impl<'a> Room<'a> {
         let n = 0.5 * (tongue.n0 + tongue.n1);
         let is_free = |s: f64| {
             let place = station.point + n * station.n + s * station.s;
-            let blocked = self.grid.band.sample(&self.blocked, place);
+            let blocked = self.grid.band.sample(&self.keep_out, place);
             blocked.is_some_and(|by| by < -f64::from(self.clearance_mm))
         };
         [0.5, 0.25, -0.25]
@@ -326,7 +326,7 @@ impl<'a> Room<'a> {
             let below = ((depth[n] - floor) / cell).clamp(0.0, 1.0);
             self.gap_mm[n] + (self.clearance_mm - self.gap_mm[n]).max(0.0) * below
         };
-        let space = region(&|n| (depth[n] - ceiling).min(-self.blocked[n] - away(n)));
+        let space = region(&|n| (depth[n] - ceiling).min(-self.keep_out[n] - away(n)));
         let below = region(&|n| depth[n] - floor);
         let beside = region(&|n| self.side[n] - self.gap_mm[n]);
         let free = whole.intersect(&space);
@@ -335,7 +335,7 @@ impl<'a> Room<'a> {
 }
 
 fn joint(run: &Run, halves: &Halves) -> FinishedJoint {
-    let volume_mm3 = [halves.carved[0].volume(), halves.carved[1].volume()];
+    let volume_mm3 = [halves.shapes[0].volume(), halves.shapes[1].volume()];
     let kept = std::array::from_fn(|h| {
         if halves.raw[h] > 0.0 {
             volume_mm3[h] / halves.raw[h]
@@ -350,14 +350,14 @@ fn joint(run: &Run, halves: &Halves) -> FinishedJoint {
         female: run.female,
         length_mm,
         volume_mm3,
-        kept,
+        intact_share: kept,
         at: run.middle(),
         is_rail: run.is_rail(),
     }
 }
 
 /// Unites the bodies with the half connectors that were kept.
-fn joined(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
+fn unite(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
     let pieces: Vec<Volume> = ids
         .par_iter()
@@ -365,10 +365,10 @@ fn joined(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> I
             let mut parts = Vec::new();
             for (joint, half) in joints.iter().zip(halves).filter(|(j, _)| j.length_mm > 0.0) {
                 if joint.male == q {
-                    parts.push(half.carved[0].clone());
+                    parts.push(half.shapes[0].clone());
                 }
                 if joint.female == q {
-                    parts.push(half.carved[1].clone());
+                    parts.push(half.shapes[1].clone());
                 }
             }
             shell.bodies[q].union(&Volume::union_all(parts))
@@ -429,7 +429,7 @@ fn ribs_of_key(
 }
 
 /// Applies all changes and numbers to the pieces, and makes meshes that can be written.
-fn printed(
+fn make_printable(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
     grid: &ShellGrid,

@@ -81,7 +81,7 @@ const TURNS: [f64; 4] = [0.0, 0.5, -0.5, 1.57];
 /// The volume to cut from `piece` to engrave its `number`; `None` where no place has room for it.
 pub(super) fn cut(params: &LabelParams, grid: &ShellGrid, number: usize, piece: &Volume) -> Option<Volume> {
     let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
-    Wall::new(params, piece.to_mesh(), grid.thickness_mm, &depth).engraved(u32::try_from(number).ok()?)
+    Wall::new(params, piece.to_mesh(), grid.thickness_mm, &depth).engrave(u32::try_from(number).ok()?)
 }
 
 /// A piece's wall, with the data that placing a number needs.
@@ -95,7 +95,7 @@ struct Wall<'a> {
 }
 
 /// Writing plane in the cavity, with `right` and `up` as a reader in the cavity sees them.
-struct Sheet {
+struct WritingPlane {
     corner: Vec3,
     right: Vec3,
     up: Vec3,
@@ -103,7 +103,7 @@ struct Sheet {
     normal: Vec3,
 }
 
-impl Sheet {
+impl WritingPlane {
     fn at(&self, [x, y]: [f64; 2]) -> Vec3 {
         self.corner + x * self.right + y * self.up
     }
@@ -125,7 +125,7 @@ impl<'a> Wall<'a> {
         }
     }
 
-    fn engraved(&self, number: u32) -> Option<Volume> {
+    fn engrave(&self, number: u32) -> Option<Volume> {
         let Self {
             params, thickness_mm, ..
         } = self;
@@ -173,7 +173,7 @@ impl<'a> Wall<'a> {
 
     /// A sheet in the plane of `face` with the drawing in its middle; `None` where the wall has no room for
     /// it.
-    fn sheet(&self, face: usize, turn: f64, drawing: &Drawing) -> Option<Sheet> {
+    fn sheet(&self, face: usize, turn: f64, drawing: &Drawing) -> Option<WritingPlane> {
         let normal = self.mesh.face_normal(face);
         // Numbers stand upright where the wall does.
         let upwards = if normal.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
@@ -183,7 +183,7 @@ impl<'a> Wall<'a> {
         let (right, up) = (cos * right + sin * up, cos * up - sin * right);
         let size = drawing.size_mm();
         let corner = self.mesh.face_center(face) - 0.5 * size[0] * right - 0.5 * size[1] * up;
-        let sheet = Sheet {
+        let sheet = WritingPlane {
             corner,
             right,
             up,
@@ -204,7 +204,7 @@ impl<'a> Wall<'a> {
 
     /// Returns true if the inner side lies below a place of the sheet, about parallel to it, with the whole
     /// wall behind it.
-    fn has_whole_wall(&self, sheet: &Sheet, at: [f64; 2]) -> bool {
+    fn has_whole_wall(&self, sheet: &WritingPlane, at: [f64; 2]) -> bool {
         let Some((face, height_mm)) = self.below(sheet, at) else {
             return false;
         };
@@ -223,14 +223,14 @@ impl<'a> Wall<'a> {
     }
 
     /// First face below a place of the sheet, and its height over the sheet, mm.
-    fn below(&self, sheet: &Sheet, at: [f64; 2]) -> Option<(usize, f64)> {
+    fn below(&self, sheet: &WritingPlane, at: [f64; 2]) -> Option<(usize, f64)> {
         let origin = sheet.at(at) + ABOVE_MM * sheet.normal;
         let (face, far_mm) = self.bvh.first_hit(origin, -sheet.normal, 2.0 * ABOVE_MM)?;
         Some((face as usize, ABOVE_MM - far_mm))
     }
 
     /// Volume that the strokes of `drawing` cut from the wall.
-    fn cutter(&self, drawing: &Drawing, sheet: &Sheet) -> Option<Volume> {
+    fn cutter(&self, drawing: &Drawing, sheet: &WritingPlane) -> Option<Volume> {
         let mut parts = Vec::new();
         for stroke in &drawing.strokes {
             for pair in stroke.windows(2) {
@@ -243,7 +243,12 @@ impl<'a> Wall<'a> {
 
     /// Adds blocks along a straight stroke between two places with their heights. Halves the stroke where the
     /// surface bends.
-    fn cut_along(&self, sheet: &Sheet, ends: [([f64; 2], f64); 2], parts: &mut Vec<Volume>) -> Option<()> {
+    fn cut_along(
+        &self,
+        sheet: &WritingPlane,
+        ends: [([f64; 2], f64); 2],
+        parts: &mut Vec<Volume>,
+    ) -> Option<()> {
         let [(a, height_a), (b, height_b)] = ends;
         let along = [b[0] - a[0], b[1] - a[1]];
         let length = along[0].hypot(along[1]);

@@ -72,7 +72,7 @@ pub(super) fn ribs(
     depth: impl Fn(Vec3) -> f64,
 ) -> (Vec<PressFit>, Vec<Change>) {
     let places = spread(places(seat, depth), |p| {
-        presses_only_as_meant(seat, p, interference_mm)
+        has_intended_press(seat, p, interference_mm)
     });
     let fit = |p: &Place| PressFit {
         kind: PressFitKind::Rib,
@@ -94,7 +94,7 @@ pub(super) fn ribs(
 
 /// Returns true if the rib, measured over its whole way and against all pieces, crosses none of them deeper
 /// than intended.
-fn presses_only_as_meant(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> bool {
+fn has_intended_press(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> bool {
     let Ok(rib) = Solid::new(rib(place, seat.along, place.gap_mm + interference_mm).to_mesh()) else {
         return false;
     };

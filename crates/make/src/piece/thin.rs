@@ -48,7 +48,11 @@ pub(super) fn shave(
         .par_iter()
         .map(|piece| {
             ctx.check()?;
-            Ok(shaved(piece, least_wall_mm.min(MOST_SHEET_MM), depth))
+            Ok(without_thin_sheets(
+                piece,
+                least_wall_mm.min(MOST_SHEET_MM),
+                depth,
+            ))
         })
         .collect::<Result<_, Cancelled>>()?;
     for (i, volume) in shaved.into_iter().enumerate() {
@@ -60,7 +64,7 @@ pub(super) fn shave(
 }
 
 /// The piece without its thin sheets; `None` where nothing is thin.
-fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
+fn without_thin_sheets(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
     let mut shaved = None;
     for _ in 0..MOST_ROUNDS {
         let body: &Volume = shaved.as_ref().unwrap_or(piece);

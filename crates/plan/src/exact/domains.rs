@@ -47,7 +47,7 @@ pub(super) struct Propagator<'a> {
     pub space: &'a Space<'a>,
     key: &'a KeyChoice,
     /// Directions with a joint that holds, by contact: with `a` later, and with `b` later.
-    holding: Vec<[DirectionMask; 2]>,
+    hold_masks: Vec<[DirectionMask; 2]>,
     /// Number of pieces whose cost was evaluated: the measure of work.
     pub n_revisions: usize,
     /// Pieces still to revise.
@@ -61,7 +61,7 @@ impl<'a> Propagator<'a> {
     pub fn new(space: &'a Space<'a>, key: &'a KeyChoice) -> Self {
         let holding = space.survey.contacts.iter().map(|c| {
             [(c.a, c.b), (c.b, c.a)].map(|(p, q)| {
-                let holds = |s: &LatticeDirection| space.joined(p, *s, PieceSet::one(q)).contains(q);
+                let holds = |s: &LatticeDirection| space.joint_partners(p, *s, PieceSet::one(q)).contains(q);
                 LatticeDirection::all()
                     .filter(holds)
                     .fold(0, |mask, s| mask | mask_of(s))
@@ -71,7 +71,7 @@ impl<'a> Propagator<'a> {
         Self {
             space,
             key,
-            holding,
+            hold_masks: holding,
             n_revisions: 0,
             dirty: PieceSet::EMPTY,
             is_cost_open: PieceSet::EMPTY,
@@ -84,7 +84,7 @@ impl<'a> Propagator<'a> {
         let of_key = self.key.directions.iter().fold(0, |mask, &s| mask | mask_of(s));
         let role = |p: PatchId| {
             let is_key = p == key;
-            let separations = self.space.allowed(p) & if is_key { of_key } else { ALL_DIRECTIONS };
+            let separations = self.space.allowed_mask(p) & if is_key { of_key } else { ALL_DIRECTIONS };
             RoleSet {
                 separations,
                 may_be_first: !is_key,
@@ -264,8 +264,8 @@ impl<'a> Propagator<'a> {
         let mut hangs_on = Vec::new();
         for &i in &space.contacts_of[usize::from(p)] {
             let (own, others, _) = self.sides(i, p);
-            joining |= d.seams[i][own] & self.holding[i][own];
-            if d.seams[i][others] & self.holding[i][others] != 0 {
+            joining |= d.seams[i][own] & self.hold_masks[i][own];
+            if d.seams[i][others] & self.hold_masks[i][others] != 0 {
                 hangs_on.push(i);
             }
         }
@@ -279,7 +279,7 @@ impl<'a> Propagator<'a> {
                 let (own, others, _) = self.sides(i, p);
                 let mut states = d.seams[i];
                 states[own] = 0;
-                states[others] &= self.holding[i][others];
+                states[others] &= self.hold_masks[i][others];
                 self.set_seam(d, i, states, p)
             }
             _ => Ok(()),
@@ -319,7 +319,7 @@ impl<'a> Propagator<'a> {
         let seams = self.space.contacts_of[usize::from(p)].iter().map(seam).collect();
         Surroundings {
             seams,
-            remaining: d.after[usize::from(p)],
+            remainder: d.after[usize::from(p)],
         }
     }
 
@@ -362,7 +362,7 @@ impl<'a> Propagator<'a> {
             let mut pulled_by = pulls.clone();
             for (i, c) in self.space.survey.contacts.iter().enumerate() {
                 for (side, (later, earlier)) in [(c.a, c.b), (c.b, c.a)].into_iter().enumerate() {
-                    let joints = d.seams[i][side] & self.holding[i][side];
+                    let joints = d.seams[i][side] & self.hold_masks[i][side];
                     let is_held = later == key && joints != 0;
                     let mut arc = |from: PatchId, to: PatchId| {
                         pulls[usize::from(from)] = pulls[usize::from(from)].union(PieceSet::one(to));

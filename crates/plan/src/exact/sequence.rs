@@ -26,7 +26,7 @@ struct Sequencer<'a> {
     d: &'a Domains,
     limit: f64,
     separations: Vec<LatticeDirection>,
-    removed: Vec<LatticeStep>,
+    removals: Vec<LatticeStep>,
     /// Sets of remaining pieces from which no order was found; used only for membership tests.
     dead: HashSet<PieceSet>,
 }
@@ -47,7 +47,7 @@ pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
         d,
         limit,
         separations,
-        removed: Vec::new(),
+        removals: Vec::new(),
         dead: HashSet::new(),
     };
     if !s.descend(space.all()) {
@@ -57,8 +57,8 @@ pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
             Sequence::Unknown
         };
     }
-    s.removed.reverse();
-    let plan = LatticePlan { steps: s.removed };
+    s.removals.reverse();
+    let plan = LatticePlan { steps: s.removals };
     // Relations are the same for all orders, so if one is rejected, all are.
     if space.allows(&plan) {
         Sequence::Plan(plan)
@@ -78,14 +78,14 @@ impl Sequencer<'_> {
         for p in left.iter() {
             let rest = left.minus(PieceSet::one(p));
             if self.may_leave(p, rest) {
-                self.removed.push(LatticeStep {
+                self.removals.push(LatticeStep {
                     piece: p,
                     separation: self.separations[usize::from(p)],
                 });
                 if self.descend(rest) {
                     return true;
                 }
-                self.removed.pop();
+                self.removals.pop();
             }
         }
         self.dead.insert(left);
@@ -106,7 +106,7 @@ impl Sequencer<'_> {
         let gone: Vec<Option<LatticeDirection>> = (0..self.space.n)
             .map(|q| (!rest.contains(q.into()) && q != usize::from(p)).then(|| self.separations[q]))
             .collect();
-        let (role, around) = self.space.leaving(step, rest, &gone);
+        let (role, around) = self.space.departure(step, rest, &gone);
         self.space.costs.bound(p, role, &around) <= self.limit
     }
 }

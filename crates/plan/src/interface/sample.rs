@@ -35,7 +35,7 @@ pub(super) struct Sample {
     next_mm: f64,
     /// True if the place is far enough from the ends of an open line.
     pub has_room: bool,
-    pub blocked: Blocked,
+    pub obstruction: Blocked,
 }
 
 impl Sample {
@@ -76,7 +76,7 @@ impl Way {
 
     /// Returns true if angles, ends and other walls allow a pin at `x`.
     fn has_pin(&self, x: &Sample) -> bool {
-        let is_blocked = || x.blocked.has(usize::from(self.side < 0.0), self.s);
+        let is_blocked = || x.obstruction.has(usize::from(self.side < 0.0), self.s);
         x.has_room && !is_blocked() && x.frame(self.side).carries(self.s.unit())
     }
 
@@ -90,7 +90,7 @@ impl Way {
     }
 
     /// Direction that the sides of a pin face, perpendicular to the seam and to the separation direction.
-    fn facing(&self, x: &Sample) -> Vec3 {
+    fn side_normal(&self, x: &Sample) -> Vec3 {
         x.tangent.cross(self.s.unit()).normalize_or_zero()
     }
 }
@@ -177,7 +177,7 @@ impl Line {
         let n = self.samples.len();
         let normals: Vec<Vec3> = self.samples.iter().map(|x| x.normal).collect();
         let later_is_male = later_is_male(&normals, way.s.unit(), self.is_loop);
-        let facing: Vec<Vec3> = self.samples.iter().map(|x| way.facing(x)).collect();
+        let facing: Vec<Vec3> = self.samples.iter().map(|x| way.side_normal(x)).collect();
         let fits = |i: usize, j: usize| {
             later_is_male[i] == later_is_male[j] && facing[i].dot(facing[j]) >= SHARPEST_TURN.cos()
         };
@@ -299,7 +299,7 @@ fn line(
             length_mm: 0.5 * (before + step(i)),
             next_mm: step(i),
             has_room,
-            blocked: blocked.unwrap_or_default(),
+            obstruction: blocked.unwrap_or_default(),
         }
     };
     Line {

@@ -84,7 +84,7 @@ struct Walk<'a> {
     topology: &'a Topology,
     along: Vec3,
     /// Edge through which the walk entered the present face, if any.
-    entered: Option<HalfEdge>,
+    entry: Option<HalfEdge>,
     face: usize,
     at: Vec3,
     gone_mm: f64,
@@ -97,7 +97,7 @@ impl<'a> Walk<'a> {
             surface,
             topology,
             along,
-            entered: None,
+            entry: None,
             face,
             at: surface.mesh.corners(face).iter().sum::<Vec3>() / 3.0,
             gone_mm: 0.0,
@@ -110,14 +110,12 @@ impl<'a> Walk<'a> {
         let corners = self.surface.mesh.corners(self.face);
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let first = 3 * self.face as u32;
-        let outs = (0..3)
-            .filter(|&k| self.entered != Some(first + k))
-            .filter_map(|k| {
-                let (from, to) = (corners[k as usize], corners[(k as usize + 1) % 3]);
-                let outwards = (to - from).cross(normal);
-                let speed = self.along.dot(outwards);
-                (speed > 0.0).then(|| (first + k, ((from - self.at).dot(outwards) / speed).max(0.0)))
-            });
+        let outs = (0..3).filter(|&k| self.entry != Some(first + k)).filter_map(|k| {
+            let (from, to) = (corners[k as usize], corners[(k as usize + 1) % 3]);
+            let outwards = (to - from).cross(normal);
+            let speed = self.along.dot(outwards);
+            (speed > 0.0).then(|| (first + k, ((from - self.at).dot(outwards) / speed).max(0.0)))
+        });
         outs.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
@@ -132,7 +130,7 @@ impl Iterator for Walk<'_> {
         let (edge, mm) = self.way_out()?;
         let opposite = self.topology.opposite(edge);
         (self.at, self.gone_mm) = (self.at + mm * self.along, self.gone_mm + mm);
-        (self.face, self.entered) = (opposite as usize / 3, Some(opposite));
+        (self.face, self.entry) = (opposite as usize / 3, Some(opposite));
         let [a, b, c] = self.surface.mesh.corners(self.face);
         let doubled = (b - a).cross(c - a);
         let towards = doubled.dot(self.along) / doubled.length().max(f64::MIN_POSITIVE);

@@ -14,7 +14,7 @@ const PARAMS: SizeParams = SizeParams {
     strength_mpa: 42.0,
 };
 
-fn chosen(
+fn choose_for(
     surface: &SegmentedSurface,
     params: &SizeParams,
     stress_mpa: Option<StressField>,
@@ -68,14 +68,14 @@ fn a_fixed_size_is_that_of_all_pairs_whatever_the_stress() {
         choice: SizeChoice::Fixed(2.5),
         ..PARAMS
     };
-    let (found, warnings) = chosen(&halves(Vec3::new(5.0, 5.0, 30.0)), &params, Some(&|_| 40.0));
+    let (found, warnings) = choose_for(&halves(Vec3::new(5.0, 5.0, 30.0)), &params, Some(&|_| 40.0));
     assert_eq!(
         found,
         ChosenSizes {
             sizes: ConnectorSizes::default(),
-            limited: Vec::new(),
+            reductions: Vec::new(),
             most: BTreeMap::new(),
-            raised: Vec::new(),
+            increases: Vec::new(),
         }
     );
     assert!(warnings.is_empty());
@@ -84,7 +84,7 @@ fn a_fixed_size_is_that_of_all_pairs_whatever_the_stress() {
 #[test]
 fn for_the_sake_of_use_connectors_grow_once_to_what_fits_and_that_is_told() {
     let surface = halves(Vec3::splat(40.0));
-    let (mut sizes, _) = chosen(&surface, &PARAMS, None);
+    let (mut sizes, _) = choose_for(&surface, &PARAMS, None);
     let mut capped = sizes.clone();
     assert!(sizes.raise([B, A], "pressed on its top") && !sizes.raise([A, B], "dropped"));
     assert_eq!(sizes.sizes.of(A, B), 4.0);
@@ -100,17 +100,17 @@ fn for_the_sake_of_use_connectors_grow_once_to_what_fits_and_that_is_told() {
         choice: SizeChoice::Fixed(2.5),
         ..PARAMS
     };
-    assert!(!chosen(&surface, &fixed, None).0.raise([A, B], "dropped"));
+    assert!(!choose_for(&surface, &fixed, None).0.raise([A, B], "dropped"));
 }
 
 #[test]
 fn where_all_fits_the_greatest_stress_of_a_seam_alone_decides() {
     let surface = halves(Vec3::splat(40.0));
-    let (none, warnings) = chosen(&surface, &PARAMS, None);
+    let (none, warnings) = choose_for(&surface, &PARAMS, None);
     assert!(none.sizes.of(A, B) == 2.0 && warnings.is_empty());
     // A peak at one place of the seam; stress off the seam does not count.
     let field = |p: Vec3| if p.z.abs() > 10.0 { 42.0 } else { 21.0 * p.x / 40.0 };
-    let (some, warnings) = chosen(&surface, &PARAMS, Some(&field));
+    let (some, warnings) = choose_for(&surface, &PARAMS, Some(&field));
     assert!(
         (some.sizes.of(A, B) - 3.0).abs() < 0.01 && warnings.is_empty(),
         "{some:?}"
@@ -122,7 +122,7 @@ fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
     // A limb 10.4 mm thick: 6.4 mm of cavity, less two clearances, is 6.2 mm = 1.05 D for D = 5.9; 7.4 mm
     // leaves 3.05.
     let thick = |radius_mm: f64| {
-        chosen(
+        choose_for(
             &halves(Vec3::new(radius_mm, radius_mm, 60.0)),
             &PARAMS,
             Some(&|_| 42.0),
@@ -157,7 +157,7 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
     };
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
     let octants = |radius_mm: f64| label(sphere(4, Vec3::splat(radius_mm)), 8, octant);
-    let (found, warnings) = chosen(&octants(12.0), &params, Some(&|_| 42.0));
+    let (found, warnings) = choose_for(&octants(12.0), &params, Some(&|_| 42.0));
     // Seams are quarters of circles; inside the wall their radius is 11.5 mm.
     let expected_mm = std::f64::consts::FRAC_PI_2 * 11.5 / CONTACT_SIZES;
     for (pair, size_mm) in found.sizes.pairs() {
@@ -168,7 +168,7 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
     }
     // All twelve seams are short, and one warning covers them.
     assert_eq!(
-        (found.limited.len(), warnings.len(), warnings[0].pieces.len()),
+        (found.reductions.len(), warnings.len(), warnings[0].pieces.len()),
         (12, 1, 8)
     );
     assert!(
@@ -176,7 +176,7 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
         "{}",
         warnings[0].to_string()
     );
-    let (least, _) = chosen(&octants(6.0), &params, Some(&|_| 42.0));
+    let (least, _) = choose_for(&octants(6.0), &params, Some(&|_| 42.0));
     assert!(
         least.sizes.pairs().all(|(_, size_mm)| size_mm == 2.0),
         "{least:?}"
@@ -186,7 +186,7 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
 #[test]
 fn a_wish_that_is_missed_by_little_is_not_told() {
     let at = |stress_mpa: f64| {
-        chosen(
+        choose_for(
             &halves(Vec3::new(3.7, 3.7, 60.0)),
             &PARAMS,
             Some(&move |_| stress_mpa),
@@ -229,7 +229,11 @@ fn an_empty_surface_has_no_sizes() {
         n_patches: 0,
     };
     assert_eq!(
-        chosen(&surface, &PARAMS, Some(&|_| 1.0)).0.sizes.pairs().count(),
+        choose_for(&surface, &PARAMS, Some(&|_| 1.0))
+            .0
+            .sizes
+            .pairs()
+            .count(),
         0
     );
 }

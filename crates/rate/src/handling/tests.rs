@@ -150,15 +150,15 @@ fn the_factor_is_that_of_the_joint_that_gives_way_first() {
         error: 0.0,
     };
     // The openings of 0.6 mm and 1.2 mm are the limits of these connectors.
-    let opens = borne(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 1.0]), 42.0);
+    let opens = load_factor(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 1.0]), 42.0);
     assert_eq!(opens.first, Some((Failure::Opens, 0)));
     assert!((opens.factor - 2.0).abs() < 1e-12);
-    let yields = borne(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 42.0]), 42.0);
+    let yields = load_factor(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 42.0]), 42.0);
     assert_eq!(
         (yields.factor, yields.first),
         (1.0, Some((Failure::PinYields, 2)))
     );
-    assert_eq!(borne(&plan, &bearing([0.0; 3], [0.0; 3]), 42.0), Borne::ANY);
+    assert_eq!(load_factor(&plan, &bearing([0.0; 3], [0.0; 3]), 42.0), Borne::ANY);
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn a_pin_of_three_in_a_hundred_decides_and_one_of_two_does_not() {
             n_iterations: 1,
             error: 0.0,
         };
-        borne(&plan, &bearing, 42.0).factor
+        load_factor(&plan, &bearing, 42.0).factor
     };
     assert_eq!([0, 2, 4, 100].map(factor), [2.0, 2.0, 0.5, 0.5]);
 }

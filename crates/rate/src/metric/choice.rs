@@ -203,11 +203,11 @@ pub struct Choice<'a> {
 /// The strongest plan, and its properties.
 pub struct Chosen {
     /// Result of the search, with that plan in place of its own.
-    pub found: FoundPlan,
+    pub search_result: FoundPlan,
     /// Resistance of the plan.
     pub holding: Holding,
     /// Motion of the pieces under the loads that are reported.
-    pub deformed: Deformed,
+    pub deformation: Deformed,
     /// True if a stronger plan would have been sought if more time were left.
     pub is_cut_short: bool,
 }
@@ -233,7 +233,7 @@ pub fn choose(
         is_cut_short,
         ..
     } = most_bearing(ctx, choice, foresight, &bench, &found)?;
-    let chosen = best.ranked.clone();
+    let chosen = best.candidate.clone();
     let solved = bench.surface.resist(&best.meetings, chosen.plan.key().0)?;
     let Foreseen {
         play: foreseen_play,
@@ -252,7 +252,7 @@ pub fn choose(
         foreseen_play,
         foreseen_excess,
         bears,
-        ..holding(model, &chosen.plan, &best.meetings, &solved.resistance)
+        ..collect_holding(model, &chosen.plan, &best.meetings, &solved.resistance)
     };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
@@ -272,9 +272,9 @@ pub fn choose(
     found.pool.retain(|p| p.plan != chosen.plan);
     found.pool.insert(0, chosen);
     Ok(Chosen {
-        found,
+        search_result: found,
         holding,
-        deformed,
+        deformation: deformed,
         is_cut_short,
     })
 }
@@ -291,14 +291,14 @@ fn most_bearing<'b>(
         return Err(ChoiceError::NoPlan);
     };
     let most_cost = found.score.worst * (1.0 + COST_SLACK);
-    let counted = found.counted(choice.survey);
+    let counted = found.apply_counts(choice.survey);
     let around = Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
     let may_be = |p: &RankedPlan| foresight.is_steady(&p.plan);
     let starts = foresight.steady();
     match climb(ctx, choice.climb, bench, &around, &starts, &may_be) {
         Ok(climbed) => Ok(climbed),
         Err(ClimbError::NoPlan) => Ok(Climbed {
-            best: bench.rated(first.clone())?,
+            best: bench.rate(first.clone())?,
             n_plans: 1,
             n_solves: 0,
             is_cut_short: false,
@@ -321,7 +321,7 @@ pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> 
             at: model.place_of(station as usize).to_array(),
         }),
     };
-    bench.cases.iter().zip(&rated.borne()).map(one).collect()
+    bench.cases.iter().zip(&rated.load_factors()).map(one).collect()
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
@@ -351,9 +351,9 @@ fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
     };
     ctx.warn(Warning::new(
         Cause::BearsLittle {
-            done: weakest.deed.done().to_owned(),
+            load: weakest.deed.words().to_owned(),
             bears: much(factor),
-            asked: much(1.0),
+            requirement: much(1.0),
             gives_way: gives_way.to_owned(),
         },
         first.between.to_vec(),
@@ -387,7 +387,12 @@ fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
 }
 
 /// Collects the stations' openings by pairs of pieces.
-fn holding(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], resistance: &Resistance) -> Holding {
+fn collect_holding(
+    model: &PlanModel,
+    plan: &LatticePlan,
+    meetings: &[Meeting],
+    resistance: &Resistance,
+) -> Holding {
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {

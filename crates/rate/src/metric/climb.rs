@@ -162,7 +162,7 @@ impl<'b> Climber<'_, 'b> {
     /// The starts with the greatest load factors of their worst uses, best first.
     fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
         let allowed: Vec<RankedPlan> = (starts.par_iter())
-            .filter_map(|start| self.around.ranked(start.plan.clone()))
+            .filter_map(|start| self.around.rank(start.plan.clone()))
             .collect();
         let Some((first, others)) = allowed.split_first() else {
             return Err(ClimbError::NoPlan);
@@ -190,7 +190,7 @@ impl<'b> Climber<'_, 'b> {
                 .collect();
             asked.sort_by(|a, b| best[0].factor(a.0).total_cmp(&best[0].factor(b.0)));
             asked.extend(self.bench.goals(Rank::Pull).into_iter().map(|g| (g, 0.0)));
-            best.extend(self.tried(batch, &best[0].clone(), &asked)?);
+            best.extend(self.try_plans(batch, &best[0].clone(), &asked)?);
             best.sort_by(|a, b| b.least().total_cmp(&a.least()));
             best.truncate(n);
         }
@@ -213,7 +213,7 @@ impl<'b> Climber<'_, 'b> {
 
     /// Returns those of `plans` that meet the goals as `asked`. The others are rejected at the first goal
     /// that they do not meet. `like` is a similar plan, whose solutions are the starting points.
-    fn tried(
+    fn try_plans(
         &mut self,
         plans: &[RankedPlan],
         like: &Rated<'b>,
@@ -261,7 +261,7 @@ impl<'b> Climber<'_, 'b> {
 
     /// Goals and least load factors of a move that improves the goal at `place` of `order`. That goal comes
     /// first, as most moves do not improve it.
-    fn asked(
+    fn requests(
         &self,
         at: &Rated<'b>,
         rank: Rank,
@@ -297,19 +297,19 @@ impl<'b> Climber<'_, 'b> {
         floor: f64,
         most_solves: usize,
     ) -> Result<Option<Rated<'b>>, ClimbError> {
-        let asked = self.asked(at, rank, order, place, floor);
-        let mut seen = BTreeSet::from([self.around.name(&at.ranked.plan)]);
+        let asked = self.requests(at, rank, order, place, floor);
+        let mut seen = BTreeSet::from([self.around.name(&at.candidate.plan)]);
         for pieces in self.movers(at, order[place]) {
             let mut moves = Vec::new();
             for piece in pieces {
-                moves.extend(self.around.moves(&at.ranked.plan, piece, &mut seen));
+                moves.extend(self.around.moves(&at.candidate.plan, piece, &mut seen));
             }
-            for batch in self.allowed(moves).chunks(BATCH) {
+            for batch in self.select_moves(moves).chunks(BATCH) {
                 self.ctx.check()?;
                 if self.is_time_over() {
                     return Ok(None);
                 }
-                let met = self.tried(batch, at, &asked)?;
+                let met = self.try_plans(batch, at, &asked)?;
                 let best = self.highest(met, rank);
                 if best.is_some() || self.n_solves >= most_solves {
                     return Ok(best);
@@ -330,7 +330,7 @@ impl<'b> Climber<'_, 'b> {
                 }
             });
             let plan = plans.remove(best);
-            if (self.may_be)(&plan.ranked) {
+            if (self.may_be)(&plan.candidate) {
                 return Some(plan);
             }
         }
@@ -355,11 +355,9 @@ impl<'b> Climber<'_, 'b> {
     }
 
     /// The `moves` that keep all conditions, with their costs.
-    fn allowed(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
-        let ranked: Vec<Option<RankedPlan>> = moves
-            .into_par_iter()
-            .map(|plan| self.around.ranked(plan))
-            .collect();
+    fn select_moves(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
+        let ranked: Vec<Option<RankedPlan>> =
+            moves.into_par_iter().map(|plan| self.around.rank(plan)).collect();
         ranked.into_iter().flatten().collect()
     }
 }

@@ -83,9 +83,9 @@ pub struct Deformed {
 #[derive(Clone, Debug)]
 pub struct DeformedLoad {
     /// Kind of the load in reports.
-    pub told: Told,
+    pub kind: Told,
     /// Load factor of the kit under the load.
-    pub borne: LoadBorne,
+    pub capacity: LoadBorne,
     /// Places where the load acts, the nearest to [`LoadBorne::at`] first: the press, then the reaction of
     /// the floor; both fingers of a grip.
     pub touches: Vec<Touch>,
@@ -125,8 +125,8 @@ impl Deformed {
             .collect();
         let load = |&(told, i): &(Told, usize)| {
             Ok(DeformedLoad {
-                told,
-                borne: bears[i].clone(),
+                kind: told,
+                capacity: bears[i].clone(),
                 touches: touches(&model.assembly.points, &bench.cases[i]),
                 moved_mm: rated.moved_mm(i)?,
             })
@@ -173,7 +173,7 @@ fn touches(points: &[Vec3], case: &LoadCase) -> Vec<Touch> {
 mod tests {
     use super::*;
 
-    fn borne(deed: Deed, factor: Option<f64>) -> LoadBorne {
+    fn capacity(deed: Deed, factor: Option<f64>) -> LoadBorne {
         LoadBorne {
             deed,
             force_n: 70.0,
@@ -187,14 +187,14 @@ mod tests {
     fn each_kind_is_told_by_the_load_that_is_borne_least_and_what_is_not_there_is_left_out() {
         let side = |factor| {
             let toward = [1.0, 0.0, 0.0];
-            borne(Deed::PressSide { toward }, factor)
+            capacity(Deed::PressSide { toward }, factor)
         };
         let bears = [
             side(None),
             side(Some(2.0)),
             side(Some(1.5)),
-            borne(Deed::FallUpright, Some(0.5)),
-            borne(
+            capacity(Deed::FallUpright, Some(0.5)),
+            capacity(
                 Deed::Fall {
                     down: [0.0, 0.0, 1.0],
                 },

@@ -141,7 +141,7 @@ impl PlanModel {
         split_short_seams(&mut coarse);
         Self::of_mesh(
             params,
-            &relaxed(coarse.mesh),
+            &relax_folds(coarse.mesh),
             &coarse.labels,
             surface.n_patches,
             sizes,
@@ -403,7 +403,7 @@ const LEAST_COSINE: f64 = 0.2;
 /// Moves points towards their neighbours where triangles fold so sharply that no wall can be built on them.
 ///
 /// At ears and in ditches narrower than an edge a coarse mesh has a few such points in two thousand.
-fn relaxed(mut mesh: TriMesh) -> TriMesh {
+fn relax_folds(mut mesh: TriMesh) -> TriMesh {
     /// Greatest number of rounds; most folds are gone after two.
     const MOST_ROUNDS: usize = 50;
     for _ in 0..MOST_ROUNDS {

@@ -15,7 +15,7 @@ use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
 use shellock_plan::{LatticePlan, RankedPlan};
 
 use super::PlanModel;
-use crate::handling::{Borne, Deed, Handling, LoadCase, borne, load_cases};
+use crate::handling::{Borne, Deed, Handling, LoadCase, load_cases, load_factor};
 
 /// Load factor above which a further increase is not worth a move.
 pub const ENOUGH: f64 = 1.5;
@@ -64,19 +64,19 @@ pub struct Bench<'a> {
 #[derive(Clone)]
 pub struct Rated<'a> {
     /// The plan with its costs.
-    pub ranked: RankedPlan,
+    pub candidate: RankedPlan,
     /// Walls and joints that the plan makes of each station.
     pub meetings: Vec<Meeting>,
     bench: &'a Bench<'a>,
     /// Answer to each goal that was solved.
     answers: Vec<Option<Answer>>,
-    joined: JoinedParts<'a>,
+    parts: JoinedParts<'a>,
 }
 
 #[derive(Clone)]
 struct Answer {
-    borne: Borne,
-    closed: Closed,
+    load_factor: Borne,
+    closure: Closed,
 }
 
 impl<'a> Bench<'a> {
@@ -124,13 +124,13 @@ impl<'a> Bench<'a> {
             .filter(|(_, rank)| **rank == Rank::Use);
         uses.map(|(load, _)| {
             let (bearing, _) = joined.bear(&meetings, load, None)?;
-            Ok(borne(&meetings, &bearing, self.strength_mpa).factor)
+            Ok(load_factor(&meetings, &bearing, self.strength_mpa).factor)
         })
         .try_fold(f64::INFINITY, |least, factor| Ok(least.min(factor?)))
     }
 
     /// Solves all goals of a plan.
-    pub fn rated(&self, ranked: RankedPlan) -> Result<Rated<'_>, SparseError> {
+    pub fn rate(&self, ranked: RankedPlan) -> Result<Rated<'_>, SparseError> {
         let mut rated = self.begun(ranked, None)?;
         for goal in 0..self.ranks.len() {
             rated.ask(goal, None)?;
@@ -145,13 +145,13 @@ impl<'a> Bench<'a> {
         from: Option<&Rated<'b>>,
     ) -> Result<Rated<'b>, SparseError> {
         let meetings = self.model.meetings(&ranked.plan);
-        let joined = from.map_or_else(|| self.surface.join(&meetings), |f| f.joined.rejoin(&meetings))?;
+        let joined = from.map_or_else(|| self.surface.join(&meetings), |f| f.parts.rejoin(&meetings))?;
         Ok(Rated {
-            ranked,
+            candidate: ranked,
             meetings,
             bench: self,
             answers: vec![None; self.ranks.len()],
-            joined,
+            parts: joined,
         })
     }
 
@@ -171,14 +171,14 @@ impl<'b> Rated<'b> {
     }
 
     /// Load factors of the plan, in the order of the bench's cases; infinite for those not solved.
-    pub fn borne(&self) -> Vec<Borne> {
+    pub fn load_factors(&self) -> Vec<Borne> {
         (0..self.bench.cases.len())
             .map(|goal| self.answer(goal))
             .collect()
     }
 
     fn answer(&self, goal: usize) -> Borne {
-        self.answers[goal].as_ref().map_or(Borne::ANY, |a| a.borne)
+        self.answers[goal].as_ref().map_or(Borne::ANY, |a| a.load_factor)
     }
 
     /// Load factor of a goal; infinite where it was not solved.
@@ -197,19 +197,22 @@ impl<'b> Rated<'b> {
         if self.answers[goal].is_some() {
             return Ok(false);
         }
-        let start = like.and_then(|l| l.answers[goal].as_ref()).map(|a| &a.closed);
+        let start = like.and_then(|l| l.answers[goal].as_ref()).map(|a| &a.closure);
         let (meetings, bench) = (&self.meetings, self.bench);
         let (borne, closed) = match bench.drifts.get(goal) {
             Some(load) => {
-                let (bearing, closed) = self.joined.bear(meetings, load, start)?;
-                (borne(meetings, &bearing, bench.strength_mpa), closed)
+                let (bearing, closed) = self.parts.bear(meetings, load, start)?;
+                (load_factor(meetings, &bearing, bench.strength_mpa), closed)
             }
             None => {
-                let (opening, closed) = self.joined.pull(meetings, start)?;
+                let (opening, closed) = self.parts.pull(meetings, start)?;
                 (Borne::of_pull(&opening), closed)
             }
         };
-        self.answers[goal] = Some(Answer { borne, closed });
+        self.answers[goal] = Some(Answer {
+            load_factor: borne,
+            closure: closed,
+        });
         Ok(true)
     }
 
@@ -229,8 +232,8 @@ impl<'b> Rated<'b> {
     /// Displacement of each point of the outer surface under a case, mm.
     pub(super) fn moved_mm(&self, case: usize) -> Result<Vec<Vec3>, SparseError> {
         let forces_n = &self.bench.cases[case].forces_n;
-        let closed = self.answers[case].as_ref().map(|a| &a.closed);
-        self.joined.moved_mm(forces_n, closed)
+        let closed = self.answers[case].as_ref().map(|a| &a.closure);
+        self.parts.moved_mm(forces_n, closed)
     }
 
     /// Goals of a rank with less than enough, worst first.

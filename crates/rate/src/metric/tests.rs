@@ -166,7 +166,7 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
 }
 
 /// The plan that is chosen for `surface`, its resistance, and the warnings on the way.
-fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
+fn choose_for(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
     let ctx = Ctx::quiet();
     let (params, sizes) = (
         PlanParams {
@@ -197,24 +197,24 @@ fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
         climb,
     };
     let Chosen {
-        found,
+        search_result: found,
         holding,
-        deformed,
+        deformation,
         is_cut_short,
     } = choose(&ctx, &choice, &Foresight::of(&choice, &found), *found).unwrap();
     assert!(!is_cut_short, "without a clock nothing ends early");
-    check_deformed(&holding, &deformed);
+    check_deformation(&holding, &deformation);
     (found, holding, ctx.into_warnings())
 }
 
 /// Asserts that pictures show reported loads, that all pieces move, and that no point goes far where nothing
 /// fails.
-fn check_deformed(holding: &Holding, deformed: &Deformed) {
-    assert!(deformed.loads.iter().any(|l| l.told == Told::Feet));
+fn check_deformation(holding: &Holding, deformed: &Deformed) {
+    assert!(deformed.loads.iter().any(|l| l.kind == Told::Feet));
     let n_points = deformed.surface.points.len();
     assert_eq!(deformed.piece_of_point.len(), n_points);
     for load in &deformed.loads {
-        assert!(holding.bears.contains(&load.borne), "{load:?}");
+        assert!(holding.bears.contains(&load.capacity), "{load:?}");
         assert_eq!(load.moved_mm.len(), n_points);
         assert!(load.moved_mm.iter().any(|m| m.length() > 1e-6));
         let (first, second) = (load.touches[0].force_n, load.touches.get(1));
@@ -246,7 +246,7 @@ fn pieces_move_by_the_same_bits_on_any_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let bench = Bench::new(&handling, &model).unwrap();
-            let rated = bench.rated(found.pool[0].clone()).unwrap();
+            let rated = bench.rate(found.pool[0].clone()).unwrap();
             (0..bench.cases.len())
                 .map(|i| rated.moved_mm(i).unwrap())
                 .collect::<Vec<_>>()
@@ -257,7 +257,7 @@ fn pieces_move_by_the_same_bits_on_any_number_of_threads() {
 
 #[test]
 fn the_chosen_plan_leads_the_pool_and_the_others_follow_by_cost() {
-    let (found, holding, _) = chosen(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let (found, holding, _) = choose_for(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     assert!(holding.n_compared > 1, "{holding:?}");
     let (first, others) = found.pool.split_first().unwrap();
     assert!(first.plan == found.plan && first.score == found.score);
@@ -273,7 +273,7 @@ fn the_chosen_plan_leads_the_pool_and_the_others_follow_by_cost() {
 
 #[test]
 fn a_half_that_nothing_holds_is_told_with_its_place() {
-    let (found, _, warnings) = chosen(&label(sphere(5, Vec3::splat(40.0)), 2, |p| u32::from(p.z > 0.0)));
+    let (found, _, warnings) = choose_for(&label(sphere(5, Vec3::splat(40.0)), 2, |p| u32::from(p.z > 0.0)));
     let loose = warnings
         .iter()
         .find(|w| w.code() == "piece-loose")

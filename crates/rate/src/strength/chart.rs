@@ -165,7 +165,7 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
     let rows = [
         format!(
             "Von Mises stress in fall {} of the wall of {:.2} mm",
-            strength.deciding.0 + 1,
+            strength.decisive_fall.0 + 1,
             strength.thickness_mm
         ),
         format!(
@@ -239,9 +239,9 @@ fn curve(svg: &mut String, [x, y]: [f64; 2], strength: &Strength, strength_mpa: 
         "font-weight=\"bold\"",
         "Stress and thickness",
     );
-    let last_mm = strength.tried.iter().map(|t| t.thickness_mm).fold(1.0, f64::max);
+    let last_mm = strength.trials.iter().map(|t| t.thickness_mm).fold(1.0, f64::max);
     let last_mm = (last_mm / 2.0).ceil() * 2.0;
-    let stresses = strength.tried.iter().map(|t| t.stress_mpa);
+    let stresses = strength.trials.iter().map(|t| t.stress_mpa);
     let top_mpa = (stresses.fold(strength_mpa, f64::max) / 20.0).ceil() * 20.0;
     let at = |mm: f64, mpa: f64| [x + mm / last_mm * SIZE[0], y + (1.0 - mpa / top_mpa) * SIZE[1]];
     for i in 0..=4 {
@@ -281,7 +281,7 @@ fn curve(svg: &mut String, [x, y]: [f64; 2], strength: &Strength, strength_mpa: 
         "the material\u{2019}s strength",
     );
     let points: Vec<[f64; 2]> = strength
-        .tried
+        .trials
         .iter()
         .map(|t| at(t.thickness_mm, t.stress_mpa))
         .collect();

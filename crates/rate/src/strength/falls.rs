@@ -65,14 +65,14 @@ impl Falls {
         let stresses_mpa = self.stresses(thickness_mm)?;
         let counts: Vec<(usize, f64)> = stresses_mpa
             .par_iter()
-            .map(|of_case| counting(of_case, &hollow_mm2, self.peak_share))
+            .map(|of_case| decisive_stress(of_case, &hollow_mm2, self.peak_share))
             .collect();
         let case = (0..counts.len())
             .max_by(|&i, &j| counts[i].1.total_cmp(&counts[j].1))
             .unwrap_or(0);
         let (triangle, stress_mpa) = counts[case];
         Ok(Fallen {
-            tried: Tried {
+            trial: Tried {
                 thickness_mm,
                 stress_mpa,
             },
@@ -94,12 +94,12 @@ impl Falls {
         let largest = |t: usize| stresses_mpa.iter().map(|of_case| of_case[t]).fold(0.0, f64::max);
         Strength {
             largest_mpa: (0..self.mesh.triangles.len()).map(largest).collect(),
-            thickness_mm: worst.tried.thickness_mm,
-            most_mm: worst.tried.thickness_mm,
-            stress_mpa: worst.tried.stress_mpa,
+            thickness_mm: worst.trial.thickness_mm,
+            most_mm: worst.trial.thickness_mm,
+            stress_mpa: worst.trial.stress_mpa,
             is_too_weak,
-            tried,
-            deciding: (case, self.down[case]),
+            trials: tried,
+            decisive_fall: (case, self.down[case]),
             at: self.mesh.face_center(worst.triangle),
             deciding_mpa: stresses_mpa.swap_remove(case),
             is_solid: hollow_mm2.iter().map(|a| *a == 0.0).collect(),
@@ -120,7 +120,7 @@ impl Falls {
 
 /// Results of all falls with one thickness.
 pub(super) struct Fallen {
-    pub tried: Tried,
+    pub trial: Tried,
     /// Index of the decisive fall.
     pub case: usize,
     /// Triangle with the decisive stress.
@@ -132,7 +132,7 @@ pub(super) struct Fallen {
 
 /// Triangle and value of the decisive stress, which all but `peak_share` of the area does not exceed; 0 where
 /// there is no area.
-fn counting(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) {
+fn decisive_stress(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) {
     let mut order: Vec<usize> = (0..areas.len()).filter(|&t| areas[t] > 0.0).collect();
     order.sort_by(|&i, &j| stress_mpa[j].total_cmp(&stress_mpa[i]));
     let mut left = peak_share * areas.iter().sum::<f64>();

@@ -178,11 +178,11 @@ mod tests {
         };
         let one_side = (0..line.len()).map(|i| beside(i, -0.5 * thick_mm));
         let other_side = (0..line.len()).rev().map(|i| beside(i, 0.5 * thick_mm));
-        turned(&one_side.chain(other_side).collect::<Vec<[f64; 2]>>())
+        revolve(&one_side.chain(other_side).collect::<Vec<[f64; 2]>>())
     }
 
     /// The body that a closed outline of points (distance from the z axis, z) sweeps in a full turn.
-    fn turned(outline: &[[f64; 2]]) -> Solid {
+    fn revolve(outline: &[[f64; 2]]) -> Solid {
         const N_STEPS: u32 = 48;
         let n = outline.len() as u32;
         let mut mesh = TriMesh::default();

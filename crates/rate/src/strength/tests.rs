@@ -24,7 +24,7 @@ fn quick(drop_m: f64) -> StrengthParams {
     }
 }
 
-fn found(params: &StrengthParams, model: &Solid) -> Strength {
+fn find_thickness(params: &StrengthParams, model: &Solid) -> Strength {
     thickness(&Ctx::quiet(), params, model).unwrap()
 }
 
@@ -38,21 +38,21 @@ fn the_wall_found_is_stressed_to_the_strength_and_no_thinner_one_bears_it() {
             .unwrap()
             .stress_mpa;
         params.material.strength_mpa = limit_mpa;
-        let strength = found(&params, &model);
+        let strength = find_thickness(&params, &model);
         assert!(
             (strength.stress_mpa / limit_mpa - 1.0).abs() < 0.02,
             "{wall_mm}: {limit_mpa} {:?}",
-            strength.tried
+            strength.trials
         );
         let thinner = strength
-            .tried
+            .trials
             .iter()
             .rfind(|t| t.thickness_mm < strength.thickness_mm)
             .unwrap();
         assert!(
             thinner.stress_mpa > 0.99 * limit_mpa,
             "{wall_mm}: {limit_mpa} {:?}",
-            strength.tried
+            strength.trials
         );
         assert!(strength.thickness_mm - thinner.thickness_mm <= RESOLUTION_MM);
     }
@@ -87,9 +87,9 @@ fn the_force_of_a_fall_stops_all_of_the_shell_and_acts_at_the_bottom_alone() {
 fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
     let mut params = quick(1.275);
     params.material.strength_mpa = 0.01;
-    let strength = found(&params, &ball(60.0));
+    let strength = find_thickness(&params, &ball(60.0));
     let least = strength
-        .tried
+        .trials
         .iter()
         .map(|t| t.stress_mpa)
         .fold(f64::INFINITY, f64::min);
@@ -106,7 +106,7 @@ fn a_thin_model_that_no_wall_saves_gets_the_thickest_wall_that_leaves_connectors
         ..StrengthParams::default()
     };
     params.material.strength_mpa = 0.01;
-    let strength = found(&params, &lens());
+    let strength = find_thickness(&params, &lens());
     assert!(strength.is_too_weak && strength.most_mm < USUAL_MM);
     assert_eq!(strength.thickness_mm, strength.most_mm);
 }
@@ -127,7 +127,7 @@ fn thicknesses_are_the_same_bits_on_any_number_of_threads() {
     let model = ball(60.0);
     let on = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-        pool.install(|| found(&quick(6.0), &model))
+        pool.install(|| find_thickness(&quick(6.0), &model))
     };
     assert_eq!(on(1), on(3));
 }
@@ -137,7 +137,7 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
     let plate = |half_mm: f64| Solid::new(sphere(5, Vec3::new(50.0, 40.0, half_mm))).unwrap();
     let params = quick(1.275);
     for half_mm in [3.0, 4.0, 5.0] {
-        let strength = found(&params, &plate(half_mm));
+        let strength = find_thickness(&params, &plate(half_mm));
         assert!(
             strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05,
             "{half_mm}"
@@ -159,10 +159,10 @@ fn a_thin_model_gets_a_thin_wall_with_room_for_connectors_and_a_bulky_one_does_n
         refinement: 0.1,
         ..StrengthParams::default()
     };
-    let thin = found(&params, &lens());
+    let thin = find_thickness(&params, &lens());
     assert!((params.thin_mm..params.least_mm - TOLD_THINNER_MM).contains(&thin.thickness_mm));
     assert_eq!(thin.told_thinner(&params).unwrap().code(), "wall-thin-for-room");
-    let bulky = found(&params, &ball(60.0));
+    let bulky = find_thickness(&params, &ball(60.0));
     assert!(bulky.thickness_mm >= params.least_mm && bulky.told_thinner(&params).is_none());
 }
 

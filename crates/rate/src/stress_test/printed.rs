@@ -23,7 +23,7 @@ pub const FRICTION: [f64; 2] = [0.0, 0.2];
 const BELOW_WALL_MM: f64 = 0.15;
 
 /// The finished pieces, standing and falling.
-pub(super) struct Bench<'a> {
+pub(super) struct TestRig<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
     meetings: &'a [Meeting],
@@ -34,7 +34,7 @@ pub(super) struct Bench<'a> {
     places: Vec<Vec<[Spot; 2]>>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> TestRig<'a> {
     pub fn new(
         ctx: &Ctx<'_>,
         params: &'a StressParams,
@@ -69,7 +69,7 @@ impl<'a> Bench<'a> {
             &|p| depth.at(p, wall_mm).is_none(),
             &|| ctx.check().is_err(),
         )
-        .map_err(|e| stopped(ctx, e))?;
+        .map_err(|e| stress_error(ctx, e))?;
         let places = (0..meetings.len())
             .map(|i| places(model, &meetings[i], &solid, i))
             .collect();
@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
         let moved = self
             .solid
             .under_load(&pushes, answer, friction, &|| ctx.check().is_err())
-            .map_err(|e| stopped(ctx, e))?;
+            .map_err(|e| stress_error(ctx, e))?;
         if moved.friction_off > FRICTION_OFF {
             let percent = 100.0 * moved.friction_off;
             ctx.note(&format!("friction is off by {percent:.1} % of the load"));
@@ -146,9 +146,9 @@ impl<'a> Bench<'a> {
             meetings: self.meetings,
             key: self.key,
             places: &self.places,
-            moved: &moved,
+            motion: &moved,
         };
-        Ok(seen.judged(self.params, force_n))
+        Ok(seen.judge(self.params, force_n))
     }
 }
 
@@ -158,7 +158,7 @@ struct Seen<'a> {
     meetings: &'a [Meeting],
     key: (PatchId, Vec3),
     places: &'a [Vec<[Spot; 2]>],
-    moved: &'a Moved<'a>,
+    motion: &'a Moved<'a>,
 }
 
 impl Seen<'_> {
@@ -202,13 +202,13 @@ impl Seen<'_> {
         {
             f64::INFINITY
         } else {
-            self.widest_mm(station, &|spot| self.moved.moved_mm(spot))
+            self.widest_mm(station, &|spot| self.motion.moved_mm(spot))
         }
     }
 
     /// Greatest distance by which the key slides out, mm.
     fn key_slides_mm(&self) -> f64 {
-        let moved = |spot: &Spot| self.moved.moved_mm(spot);
+        let moved = |spot: &Spot| self.motion.moved_mm(spot);
         let slides = (0..self.meetings.len()).flat_map(|i| {
             let slid: Vec<f64> = self
                 .apart(i, &moved)
@@ -219,8 +219,8 @@ impl Seen<'_> {
         slides.fold(0.0, f64::max)
     }
 
-    fn judged(&self, params: &StressParams, force_n: f64) -> Outcome {
-        let (meetings, moved) = (self.meetings, self.moved);
+    fn judge(&self, params: &StressParams, force_n: f64) -> Outcome {
+        let (meetings, moved) = (self.meetings, self.motion);
         let lost_parts = moved.lost();
         let openings: Vec<f64> = (0..meetings.len())
             .map(|i| self.opening_mm(i, &lost_parts))
@@ -267,7 +267,7 @@ impl Seen<'_> {
 /// Deviation of friction from its law, as a share of the load, above which it is reported.
 const FRICTION_OFF: f64 = 0.02;
 
-fn stopped(ctx: &Ctx<'_>, error: SolidError) -> StressError {
+fn stress_error(ctx: &Ctx<'_>, error: SolidError) -> StressError {
     match (error, ctx.check()) {
         (SolidError::Stopped, Err(cancelled)) => cancelled.into(),
         (error, _) => error.into(),

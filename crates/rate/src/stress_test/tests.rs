@@ -100,7 +100,7 @@ fn what_is_tested_is_what_is_printed() {
     assert!((tested.mass_g / shell_g - 1.0).abs() < 0.03, "{}", tested.mass_g);
     assert_eq!(tested.printed.len(), FRICTION.len());
     // Octants without connectors fall apart.
-    assert!(!tested.passed() && tested.compared.is_none());
+    assert!(!tested.has_passed() && tested.compared.is_none());
     assert!(
         tested
             .printed

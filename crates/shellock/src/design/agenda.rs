@@ -69,7 +69,7 @@ pub(super) enum Permit {
 pub(super) struct Allowance {
     permits: [Permit; TABLE.len()],
     /// Load factor below which changes are sought.
-    pub asked: f64,
+    pub least_factor: f64,
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
@@ -300,7 +300,7 @@ impl Agenda {
         let n_divided = self.count(Step::Divide);
         Allowance {
             permits: TABLE.map(|row| self.permit(ctx, row.step)),
-            asked: self.asked(),
+            least_factor: self.least_factor(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
             kit_reserve_s: self.clock.kit_reserve_s(),
             least_kit_s: self.clock.least_kit_s(),
@@ -414,7 +414,7 @@ impl Agenda {
         self.count(Step::Thicken) > 0
     }
 
-    fn asked(&self) -> f64 {
+    fn least_factor(&self) -> f64 {
         if self.count(Step::LowerLoad) > 0 {
             ONCE
         } else {

@@ -55,7 +55,7 @@ pub(super) struct Failure {
     pub reason: String,
     pub blockers: Vec<Blocker>,
     /// Pieces whose division may help, most promising first.
-    pub blamed: Vec<PatchId>,
+    pub suspects: Vec<PatchId>,
     /// Pieces that came out loose in the last kit.
     pub loose: Vec<PatchId>,
 }
@@ -72,7 +72,7 @@ impl Failure {
     /// opposite way.
     fn of_two() -> Self {
         Self {
-            blamed: vec![PatchId(0), PatchId(1)],
+            suspects: vec![PatchId(0), PatchId(1)],
             ..Self::of("two pieces come apart whichever of them is pulled; three can lock")
         }
     }
@@ -80,7 +80,7 @@ impl Failure {
     /// The failure of a later plan, whose blame comes first, with the blame of this one.
     fn after(&self, later: Self) -> Self {
         Self {
-            blamed: later.blamed.iter().chain(&self.blamed).copied().collect(),
+            suspects: later.suspects.iter().chain(&self.suspects).copied().collect(),
             loose: self.loose.clone(),
             ..later
         }
@@ -105,14 +105,14 @@ pub(super) fn make_kit(
         division,
         grid,
         survey,
-        learned,
+        lessons,
     } = setup;
     let planning = Planning {
         input: job.input,
         turn: &candidate.turn,
         division,
         survey: survey.as_ref().expect("plans were surveyed"),
-        constraints: &learned.constraints,
+        constraints: &lessons.constraints,
     };
     let (params, model, surface) = (&division.settings.body, &*candidate.model, &division.surface);
     // The proof of a plan runs on one thread; the grid and the distances in it are made beside it.
@@ -121,7 +121,7 @@ pub(super) fn make_kit(
         || next_plan(&kit_ctx, &planning, allowance),
     );
     let (grid, distances) = measured?;
-    let (chosen, late) = match plan_or_changes(ctx, division, learned, next?, allowance)? {
+    let (chosen, late) = match plan_or_changes(ctx, division, lessons, next?, allowance)? {
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
@@ -137,14 +137,14 @@ pub(super) fn make_kit(
         turn: &candidate.turn,
         grid,
         distances,
-        chosen,
+        choice: chosen,
     };
-    let found = match unless_blocked(make(kit_ctx, recipe))? {
+    let found = match kit_or_lesson(make(kit_ctx, recipe))? {
         Ok(kit) => {
             effort.kits += 1;
-            learn(ctx, division, learned, kit, allowance)?
+            learn(ctx, division, lessons, kit, allowance)?
         }
-        Err(lesson) => give_up(ctx, division, learned, &lesson, allowance)?,
+        Err(lesson) => give_up(ctx, division, lessons, &lesson, allowance)?,
     };
     let late = late.or(found.late);
     let is_hurried = is_hurried || found.end.as_ref().is_some_and(Kit::is_hurried);
@@ -182,16 +182,16 @@ fn plan_or_changes<T>(
 }
 
 /// Returns the kit, or the lesson of a piece that something blocks.
-fn unless_blocked(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>, DesignError> {
+fn kit_or_lesson(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>, DesignError> {
     match made {
         Err(DesignError::Body(BodyError::Blocked {
             piece,
             separation,
-            kept,
+            free_share: kept,
         })) => Ok(Err(Lesson::Blocked {
             piece,
             separation,
-            kept,
+            free_share: kept,
         })),
         made => made.map(Ok),
     }
@@ -229,7 +229,7 @@ fn learn(
     } else if kit.only_rattles() {
         // The search already chose the plan with the least rattling, so only other pieces help.
         let rattling: Vec<PatchId> = kit
-            .rattling()
+            .rattling_pieces()
             .into_iter()
             .map(|piece| kit.handover.patch(piece))
             .collect();
@@ -343,7 +343,7 @@ impl Planning<'_> {
         Choice {
             params: &self.division.settings.plan,
             surface: &self.division.surface,
-            sizes: &self.division.chosen.sizes,
+            sizes: &self.division.sizes.sizes,
             survey: self.survey,
             constraints: self.constraints,
             handling,
@@ -373,11 +373,11 @@ pub(super) fn seek_plan(
         turn: &setup.candidate.turn,
         division,
         survey: setup.survey.as_ref().expect("plans were surveyed"),
-        constraints: &setup.learned.constraints,
+        constraints: &setup.lessons.constraints,
     };
     let next = next_plan(&plan_ctx, &planning, allowance)?;
     Ok(
-        match plan_or_changes(ctx, division, &setup.learned, next, allowance)? {
+        match plan_or_changes(ctx, division, &setup.lessons, next, allowance)? {
             Ok((chosen, late)) => {
                 let is_hurried = chosen.is_cut_short;
                 let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
@@ -416,7 +416,7 @@ pub(super) fn next_plan(
         } => {
             let blocked = blockers.iter().map(|b| b.piece);
             return Ok(Next::None(Failure {
-                blamed: articulations.into_iter().chain(blocked).collect(),
+                suspects: articulations.into_iter().chain(blocked).collect(),
                 reason,
                 blockers,
                 ..Failure::default()
@@ -444,9 +444,9 @@ pub(super) fn next_plan(
     }
     let best = metric::choose(ctx, &choice, &foresight, *found)?;
     if settings.plan.key_slide.is_none() {
-        warn_of_key(ctx, planning, &best.found.plan);
+        warn_of_key(ctx, planning, &best.search_result.plan);
     }
-    let plan = (&best.found.pool[0], &best.holding);
+    let plan = (&best.search_result.pool[0], &best.holding);
     let (changes, late_change) = strengthen(ctx, planning, &handling, plan, allowance)?;
     let late = late.or(late_change);
     Ok(match changes.is_empty() {
@@ -461,7 +461,7 @@ fn warn_of_key(ctx: &Ctx, planning: &Planning<'_>, plan: &LatticePlan) {
     let may_be_cut = !planning.input.params.key.is_cut();
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {
-        let largest_mm = division.chosen.sizes.largest_mm();
+        let largest_mm = division.sizes.sizes.largest_mm();
         for problem in found.problems(last.piece, largest_mm, may_be_cut) {
             ctx.warn(problem);
         }

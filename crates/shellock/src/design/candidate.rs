@@ -80,12 +80,12 @@ impl<'a> Candidate<'a> {
             return Ok(Some(Division {
                 surface,
                 settings,
-                chosen,
+                sizes: chosen,
                 grip: None,
                 changes: Vec::new(),
             }));
         };
-        let Some((surface, patch)) = key.imprinted(ctx, &given, &surface)? else {
+        let Some((surface, patch)) = key.imprint(ctx, &given, &surface)? else {
             return Ok(None);
         };
         let settings = given.with_key(patch, key.along);
@@ -96,7 +96,7 @@ impl<'a> Candidate<'a> {
         Ok(Some(Division {
             surface,
             settings,
-            chosen,
+            sizes: chosen,
             grip,
             changes: Vec::new(),
         }))
@@ -129,7 +129,7 @@ impl<'a> Candidate<'a> {
 impl CutKey {
     /// Returns the surface with the key as a patch, and the id of that patch. If the key leaves a piece
     /// hanging on another, the pieces are refined first.
-    fn imprinted(
+    fn imprint(
         &self,
         ctx: &Ctx,
         settings: &Settings,
@@ -192,7 +192,7 @@ pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
 
 /// Describes a site for people.
 pub(super) fn words(site: &KeySite) -> String {
-    let place = match site.shown {
+    let place = match site.visibility {
         below if below < 0.2 => "underneath",
         beside if beside < 0.8 => "at the side",
         _ => "on top",

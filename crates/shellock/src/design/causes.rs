@@ -16,10 +16,10 @@ pub enum Cause {
     WallForUse {
         from_mm: f64,
         to_mm: f64,
-        done: String,
+        load: String,
     },
     JoinedForUse {
-        done: String,
+        load: String,
     },
     KeyNotCut {
         reasons: Vec<String>,
@@ -73,25 +73,25 @@ impl Diagnostic for Cause {
                     .to_owned(),
             )
             .by(&["labels", "pieces"]),
-            Self::WallForUse { from_mm, to_mm, done } => Told::note(
+            Self::WallForUse { from_mm, to_mm, load } => Told::note(
                 "wall-for-use",
                 format!(
-                    "walls are {to_mm:.1} mm thick, so that seams stay closed when the kit is {done}; \
+                    "walls are {to_mm:.1} mm thick, so that seams stay closed when the kit is {load}; \
                      {from_mm:.1} mm are enough for a fall"
                 ),
             )
             .by(&["thickness"]),
-            Self::JoinedForUse { done } => Told::note(
+            Self::JoinedForUse { load } => Told::note(
                 "joined-for-use",
                 format!(
-                    "two pieces are joined, since the seam between them would open when the kit is {done}"
+                    "two pieces are joined, since the seam between them would open when the kit is {load}"
                 ),
             ),
             Self::KeyNotCut { reasons } => Told::warning(
                 "key-not-cut",
                 format!(
                     "piece {first} is the key as it is, without rails: {}",
-                    shortened(reasons)
+                    shorten(reasons)
                 ),
             ),
             Self::KeyWithoutRails => Told::note(
@@ -181,7 +181,7 @@ impl Diagnostic for Cause {
 }
 
 /// First of several reasons, and the number of the others.
-fn shortened(reasons: &[String]) -> String {
+fn shorten(reasons: &[String]) -> String {
     match reasons {
         [] => "nothing better was found".to_owned(),
         [only] => only.clone(),
@@ -218,10 +218,10 @@ mod tests {
             Cause::WallForUse {
                 from_mm: 1.6,
                 to_mm: 2.8,
-                done: "dropped onto its feet".into(),
+                load: "dropped onto its feet".into(),
             },
             Cause::JoinedForUse {
-                done: "dropped onto its feet".into(),
+                load: "dropped onto its feet".into(),
             },
             Cause::KeyWithoutRails,
             Cause::KeyRibs {

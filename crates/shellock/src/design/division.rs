@@ -14,7 +14,7 @@ use crate::{Ctx, PatchId, SegmentedSurface, Warning};
 pub(super) struct Division {
     pub surface: SegmentedSurface,
     pub settings: Settings,
-    pub chosen: ChosenSizes,
+    pub sizes: ChosenSizes,
     /// Notch of the key.
     pub grip: Option<Grip>,
     /// Warnings of pieces that were joined for the sake of use.
@@ -24,7 +24,7 @@ pub(super) struct Division {
 impl Division {
     /// Warns of connectors and pieces that are not as the user wished.
     pub fn warn(&self, ctx: &Ctx<'_>) {
-        self.chosen.tell(ctx);
+        self.sizes.tell(ctx);
         for warning in &self.changes {
             ctx.warn(warning.clone());
         }
@@ -84,7 +84,7 @@ pub(super) fn revise(
     let params = &settings.segmentation;
     let ctx = &ctx.fork();
     Ok(if is_hopeless {
-        first(&failure.blamed, |p| {
+        first(&failure.suspects, |p| {
             segmentation::unite(ctx, params, surface, &[p])
         })?
     } else {
@@ -105,7 +105,9 @@ fn divide(
             return Ok(joined);
         }
     }
-    first(&failure.blamed, |p| segmentation::divide(ctx, params, surface, p))
+    first(&failure.suspects, |p| {
+        segmentation::divide(ctx, params, surface, p)
+    })
 }
 
 /// Joins the first of `pieces` to neighbours; `None` if that leaves nothing to lock.

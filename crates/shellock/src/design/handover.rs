@@ -105,7 +105,7 @@ impl Handover {
         }
     }
 
-    pub fn holding(&self, holding: Holding) -> Holding {
+    pub fn convert_holding(&self, holding: Holding) -> Holding {
         let loose = |l: LoosePiece| LoosePiece {
             piece: self.piece(l.piece),
             at: self.at(l.at),
@@ -117,7 +117,11 @@ impl Handover {
             ..s
         };
         Holding {
-            bears: holding.bears.into_iter().map(|b| self.borne(b)).collect(),
+            bears: holding
+                .bears
+                .into_iter()
+                .map(|b| self.convert_capacity(b))
+                .collect(),
             loose: holding.loose.into_iter().map(loose).collect(),
             seams: holding.seams.into_iter().map(seam).collect(),
             foreseen_play: self.in_order(&holding.foreseen_play),
@@ -126,7 +130,7 @@ impl Handover {
         }
     }
 
-    fn borne(&self, borne: LoadBorne) -> LoadBorne {
+    fn convert_capacity(&self, borne: LoadBorne) -> LoadBorne {
         // `at` also turns directions, since turns keep the origin.
         let deed = match borne.deed {
             Deed::PressSide { toward } => Deed::PressSide {
@@ -151,16 +155,16 @@ impl Handover {
         }
     }
 
-    pub fn deformed(&self, deformed: Deformed) -> Deformed {
+    pub fn convert_deformation(&self, deformed: Deformed) -> Deformed {
         let touch = |t: Touch| Touch {
             at: self.back.apply(t.at),
             force_n: self.back.apply(t.force_n),
         };
         let load = |l: DeformedLoad| DeformedLoad {
-            borne: self.borne(l.borne),
+            capacity: self.convert_capacity(l.capacity),
             touches: l.touches.into_iter().map(touch).collect(),
             moved_mm: l.moved_mm.into_iter().map(|m| self.back.apply(m)).collect(),
-            told: l.told,
+            kind: l.kind,
         };
         Deformed {
             surface: self.back.mesh(&deformed.surface),
@@ -170,7 +174,7 @@ impl Handover {
     }
 
     /// Converts finished pieces. Their meshes were already turned, before rounding.
-    pub fn finished(&self, finished: Finished) -> Finished {
+    pub fn convert_pieces(&self, finished: Finished) -> Finished {
         let joint = |j: FinishedJoint| FinishedJoint {
             male: self.piece(j.male),
             female: self.piece(j.female),

@@ -36,7 +36,7 @@ pub struct Kit {
     /// Load factors and weak places, by simulation.
     pub holding: Holding,
     /// Motion of the pieces under each reported load, by simulation.
-    pub deformed: Deformed,
+    pub deformation: Deformed,
     /// Thickness of the walls, mm.
     pub thickness_mm: f64,
     /// One printable mesh per piece, in assembled position, mm.
@@ -50,7 +50,7 @@ pub struct Kit {
     /// Checks of the finished meshes, with their findings.
     pub verification: Verification,
     /// Contacts between the finished pieces.
-    pub touching: Vec<verify::contact::Contact>,
+    pub touches: Vec<verify::contact::Contact>,
     /// Play of the finished pieces: motion within their gaps.
     pub play: KitPlay,
     /// Pieces that rattle, the loosest first.
@@ -103,7 +103,7 @@ impl Kit {
 
     /// Pieces other than the key that rattle, the loosest first. The key is left out because it is cut
     /// where there is room for it.
-    pub fn rattling(&self) -> Vec<PatchId> {
+    pub fn rattling_pieces(&self) -> Vec<PatchId> {
         let pieces = self.rattles.iter().map(|r| r.piece);
         pieces.filter(|piece| *piece != self.plan.key()).collect()
     }
@@ -115,7 +115,7 @@ impl Kit {
             n_failures: self.failures().len(),
             rattle: self.rattles.first().map_or(0.0, |r| r.excess),
             only_rattles: self.only_rattles(),
-            others_rattle: !self.rattling().is_empty(),
+            others_rattle: !self.rattling_pieces().is_empty(),
         }
     }
 }
@@ -130,7 +130,7 @@ pub(super) struct Recipe<'a> {
     /// Grid of the wall, with room for the division's largest connectors.
     pub grid: &'a ShellGrid,
     pub distances: &'a PatchDistances,
-    pub chosen: Chosen,
+    pub choice: Chosen,
 }
 
 /// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning.
@@ -142,18 +142,18 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         turn,
         grid,
         distances,
-        chosen:
+        choice:
             Chosen {
-                found,
+                search_result: found,
                 holding,
-                deformed,
+                deformation,
                 ..
             },
     } = recipe;
     let Division {
         surface,
         settings,
-        chosen,
+        sizes: chosen,
         grip,
         ..
     } = division;
@@ -177,25 +177,25 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     let made = piece::make(&ctx, &finish, grid, &shell, plan, &runs, &rooms)?;
     warn_of_press_fits(&ctx, &made);
     warn_of_bare_seams(&ctx, sizes, &contacts, &made.joints);
-    let (finished, plan) = (handover.finished(made), handover.plan());
+    let (finished, plan) = (handover.convert_pieces(made), handover.plan());
     // The verdict, from the finished meshes alone.
     let judging = ctx.fork();
-    let judged = judged(&judging, settings, model, &finished, &plan)?;
+    let judged = judge(&judging, settings, model, &finished, &plan)?;
     let warnings = judged.warnings(handover.warnings(ctx.into_warnings()), judging.into_warnings());
     Ok(Kit {
         surface: handover.surface(surface),
         sizes: handover.sizes(sizes),
         plan,
         proof: handover.proof(proof),
-        holding: handover.holding(holding),
-        deformed: handover.deformed(deformed),
+        holding: handover.convert_holding(holding),
+        deformation: handover.convert_deformation(deformation),
         thickness_mm: settings.body.thickness_mm,
         pieces: finished.meshes,
         joints: finished.joints,
         press_fits: finished.press_fits,
         contacts: handover.rooms(contacts),
         verification: judged.verification,
-        touching: judged.touching,
+        touches: judged.touches,
         play: judged.play,
         rattles: judged.rattles,
         warnings,
@@ -234,7 +234,7 @@ fn connectors(
 /// Verification and play of the finished meshes.
 struct Judged {
     verification: Verification,
-    touching: Vec<verify::contact::Contact>,
+    touches: Vec<verify::contact::Contact>,
     play: KitPlay,
     rattles: Vec<Rattle>,
 }
@@ -250,7 +250,7 @@ impl Judged {
 }
 
 /// Verifies the finished meshes, and measures their contacts and play. The checks include those on play.
-fn judged(
+fn judge(
     ctx: &Ctx,
     settings: &Settings,
     model: &Solid,
@@ -273,7 +273,7 @@ fn judged(
         let clearance_mm = settings.verify.clearance_mm;
         match play::look_for_ways_out(ctx, clearance_mm, &finished.meshes, &mut measured) {
             // A kit outlives the end of the time in it, since it only confirms what holds.
-            Err(_) if ctx.is_time_over() => ctx.warn(not_searched(&measured)),
+            Err(_) if ctx.is_time_over() => ctx.warn(way_out_warning(&measured)),
             searched => searched?,
         }
         play::check_ways_out(&measured, &finished.meshes)
@@ -282,14 +282,14 @@ fn judged(
     }
     Ok(Judged {
         verification,
-        touching,
+        touches: touching,
         play: measured,
         rattles,
     })
 }
 
 /// Warning of pieces for which no way out was sought.
-fn not_searched(play: &KitPlay) -> Warning {
+fn way_out_warning(play: &KitPlay) -> Warning {
     let key = play.slide.key;
     let pieces = play.unproven().filter(|piece| *piece != key).collect();
     Warning::new(Cause::WaysOutNotSought, pieces, None)

@@ -38,7 +38,7 @@ pub enum Lesson {
         /// Direction in which the piece leaves.
         separation: LatticeDirection,
         /// Share of the wall that could move out with the piece, in [0, 1].
-        kept: f64,
+        free_share: f64,
     },
     /// A piece lost outer surface because it was cut to pass others along its direction.
     SkinLost {
@@ -89,7 +89,7 @@ impl Lesson {
                 ..
             } => {
                 constraints.forbidden.insert((*piece, *separation));
-                *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
+                *constraints.rubs.entry((*piece, *against)).or_default() += 1;
             }
             Self::Blocked {
                 piece, separation, ..
@@ -99,12 +99,12 @@ impl Lesson {
             } => {
                 constraints.forbidden.insert((*piece, *separation));
             }
-            Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
+            Self::FailedPlan { plan, .. } => constraints.rejections.push(plan.clone()),
         }
     }
 
     /// Pieces whose division into smaller ones may help.
-    pub fn blamed(&self) -> Vec<PatchId> {
+    pub fn suspects(&self) -> Vec<PatchId> {
         match self {
             Self::WeakJoints(_) => Vec::new(),
             Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } | Self::SkinLost { piece, .. } => {
@@ -158,7 +158,11 @@ impl std::fmt::Display for Lesson {
                 "piece {piece} would rub on piece {against} on its way in, {travel_mm:.1} mm before it \
                  sits, {thickness_mm:.2} mm deep"
             ),
-            Self::Blocked { piece, kept, .. } => {
+            Self::Blocked {
+                piece,
+                free_share: kept,
+                ..
+            } => {
                 write!(
                     f,
                     "piece {piece} could take only {:.0} % of its wall along on its way out",

@@ -91,7 +91,7 @@ pub struct NoPlan {
 
 /// The best end so far, a kit or a plan, and the reasons why other trials failed.
 pub(super) struct Best<T> {
-    kept: Option<Kept<T>>,
+    entry: Option<Kept<T>>,
     /// Reasons why keys that were cut with the present wall fail, for people.
     reasons: Vec<String>,
     /// First failure with a piece as the key.
@@ -117,7 +117,7 @@ struct Kept<T> {
 impl<T> Best<T> {
     pub fn new() -> Self {
         Self {
-            kept: None,
+            entry: None,
             reasons: Vec::new(),
             failure: None,
             error: None,
@@ -143,11 +143,11 @@ impl<T> Best<T> {
             self.of_key = Some((grade, faults));
         }
         if self
-            .kept
+            .entry
             .as_ref()
             .is_none_or(|kept| grade.is_better_than(&kept.grade))
         {
-            self.kept = Some(Kept {
+            self.entry = Some(Kept {
                 end,
                 grade,
                 key,
@@ -200,12 +200,12 @@ impl<T> Best<T> {
     }
 
     pub fn has_end(&self) -> bool {
-        self.kept.is_some()
+        self.entry.is_some()
     }
 
     /// Reason to divide in another way, for people.
     pub fn words(&self) -> String {
-        match (&self.kept, &self.error) {
+        match (&self.entry, &self.error) {
             (Some(_), _) => "no kit of these pieces passes".to_owned(),
             (None, Some(error)) => format!("these pieces cannot be made: {error}"),
             (None, None) => "these pieces have no plan".to_owned(),
@@ -219,7 +219,7 @@ impl<T> Best<T> {
 
     /// Returns the best end; fails with the error of the job if there is none.
     pub fn into_end(self) -> Result<Option<T>, DesignError> {
-        match (self.kept, self.error) {
+        match (self.entry, self.error) {
             (Some(kept), _) => Ok(Some(kept.end)),
             (None, Some(error)) => Err(error),
             (None, None) => Ok(None),
@@ -245,7 +245,7 @@ impl Best<Planned> {
     /// Concludes a job that seeks a plan.
     pub fn conclude(self, ctx: &Ctx, agenda: &Agenda) -> Result<Result<Planned, NoPlan>, DesignError> {
         let is_cut_short = agenda.is_cut_short();
-        if let Some(kept) = self.kept {
+        if let Some(kept) = self.entry {
             let mut planned = kept.end;
             planned.warnings.extend(is_cut_short.then(|| time_up(0)));
             return Ok(Ok(planned));
@@ -278,7 +278,7 @@ impl Best<Kit> {
         effort: Effort,
     ) -> Result<DesignOutcome, DesignError> {
         let is_cut_short = agenda.is_cut_short();
-        let Some(kept) = self.kept else {
+        let Some(kept) = self.entry else {
             let failure = match self.why() {
                 // Other pieces that were left out might have been made.
                 Err(error) if is_cut_short => Failure::of(&error.to_string()),
@@ -336,7 +336,7 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
     let mut warnings = ctx.into_warnings();
     warnings.extend(kit.warnings.iter().cloned());
     warnings.extend(wall.warnings());
-    warnings.extend(crossing(&kit, &gaps));
+    warnings.extend(crossing_warning(&kit, &gaps));
     warnings.extend(thin_in_all(&thin));
     warnings.extend(key_warning(input, &kit, key.as_ref(), reasons));
     Ok(Design {
@@ -472,7 +472,7 @@ fn fits_within_mm(kit: &Kit, gaps: &KitGaps) -> Option<f64> {
 
 /// Warns of the deepest crossing of finished pieces, on a way out or at rest, unless it is a key
 /// with press fits that crosses.
-fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
+fn crossing_warning(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
     /// Least depth that is not rounding, mm.
     const LEAST_MM: f64 = 0.02;
     let deepest = gaps

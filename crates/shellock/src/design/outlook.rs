@@ -9,7 +9,7 @@ use super::candidate;
 use super::trial::{Parts, Trial};
 use super::wall::Wall;
 use super::ways::{self, Input};
-use super::{DesignError, Handover, KeySource, Params, explore, resolved};
+use super::{DesignError, Handover, KeySource, Params, explore, resolve_params};
 use crate::key::{self, KeyParams, KeySite};
 use crate::plan::{Blocker, PlanOutcome, search};
 use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
@@ -18,7 +18,7 @@ use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
 #[non_exhaustive]
 pub struct Outlook {
     /// Pieces with smooth seams, changed so that no piece alone connects others; no key is cut out of them.
-    pub divided: SegmentedSurface,
+    pub division: SegmentedSurface,
     /// Places where a key can be cut, best first, whatever the user chose.
     pub keys: Vec<KeySite>,
     /// Verdict: they lock or they do not.
@@ -56,13 +56,13 @@ pub fn first_division(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<SegmentedSurface, DesignError> {
-    let params = &resolved(params, model, labels)?;
+    let params = &resolve_params(params, model, labels)?;
     let input = Input {
         params,
         model,
         labels,
     };
-    let wall = Wall::nominal(params).divided(ways::ways(&input)[0]);
+    let wall = Wall::nominal(params).with_way(ways::ways(&input)[0]);
     let divided = segmentation::segment(ctx, &wall.settings.segmentation, model, labels)?;
     Ok(divided)
 }
@@ -82,7 +82,7 @@ pub fn outlook(
 ) -> Result<Outlook, DesignError> {
     let params = &Params {
         proof_budget: 0,
-        ..resolved(params, model, labels)?
+        ..resolve_params(params, model, labels)?
     };
     let input = Input {
         params,
@@ -122,7 +122,7 @@ pub fn outlook(
             surface: job.surface.clone(),
         }),
         warnings: told.into_warnings(),
-        divided: job.surface,
+        division: job.surface,
     })
 }
 
@@ -143,7 +143,7 @@ fn judge(ctx: &Ctx, parts: Parts<'_, '_>, _: &Allowance) -> Result<Found<Verdict
     let (division, turn) = (&setup.division, &setup.candidate.turn);
     let survey = setup.survey.as_ref().expect("plans were surveyed");
     let surface = &division.surface;
-    let verdict = match search(ctx, &division.settings.plan, survey, &setup.learned.constraints)? {
+    let verdict = match search(ctx, &division.settings.plan, survey, &setup.lessons.constraints)? {
         PlanOutcome::Found(found) => {
             let handover = Handover::new(turn, found.plan);
             Verdict::Locks {
@@ -189,7 +189,7 @@ mod tests {
     }
 
     /// Returns true if the division locks, and the number of its pieces, 0 if it is blocked.
-    fn told(outlook: &Outlook) -> (bool, usize) {
+    fn summary(outlook: &Outlook) -> (bool, usize) {
         match &outlook.verdict {
             Verdict::Locks { surface, plan, .. } => {
                 assert_eq!(plan.steps.len(), surface.n_patches);
@@ -209,11 +209,11 @@ mod tests {
         let divided = first_division(&ctx, &params, &vase, None).unwrap();
         let anew = outlook(&ctx, &params, &vase, None, None).unwrap();
         let known = outlook(&ctx, &params, &vase, None, Some(divided.clone())).unwrap();
-        assert_eq!(anew.divided.mesh, divided.mesh);
-        assert_eq!(anew.divided.patch_of_face, divided.patch_of_face);
-        assert_eq!(told(&anew), told(&known));
+        assert_eq!(anew.division.mesh, divided.mesh);
+        assert_eq!(anew.division.patch_of_face, divided.patch_of_face);
+        assert_eq!(summary(&anew), summary(&known));
         assert_eq!(anew.keys, known.keys);
-        assert!(told(&anew).0);
+        assert!(summary(&anew).0);
     }
 
     #[test]

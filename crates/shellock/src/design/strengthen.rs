@@ -38,7 +38,7 @@ pub(super) fn strengthen(
     (chosen, holding): (&RankedPlan, &Holding),
     allowance: &Allowance,
 ) -> Result<(Vec<Change>, Option<Step>), DesignError> {
-    let (division, asked) = (planning.division, allowance.asked);
+    let (division, asked) = (planning.division, allowance.least_factor);
     let Some(weakest) = weak(&holding.bears, asked) else {
         return Ok((Vec::new(), None));
     };
@@ -47,7 +47,7 @@ pub(super) fn strengthen(
         division,
         handling,
         plan: chosen,
-        asked,
+        least_factor: asked,
     };
     let before = factor(weakest);
     let larger = match allowance.is_allowed(Step::Enlarge) {
@@ -63,7 +63,7 @@ pub(super) fn strengthen(
     let mut late = allowance.late(Step::Enlarge).or(allowance.late(Step::JoinWeak));
     let (sizes, borne) = match &larger {
         Some((sizes, borne)) => (sizes, *borne),
-        None => (&division.chosen, before),
+        None => (&division.sizes, before),
     };
     let wall = allowance.permit(Step::Thicken);
     if wall != Permit::No
@@ -72,8 +72,8 @@ pub(super) fn strengthen(
         match wall {
             Permit::Late => late = Some(Step::Thicken),
             _ => {
-                let done = weakest.deed.done().to_owned();
-                changes.push(Change::Thicken(Thicker { thickness_mm, done }));
+                let load = weakest.deed.words().to_owned();
+                changes.push(Change::Thicken(Thicker { thickness_mm, load }));
             }
         }
     }
@@ -116,7 +116,7 @@ struct Rating<'a> {
     division: &'a Division,
     handling: &'a Handling,
     plan: &'a RankedPlan,
-    asked: f64,
+    least_factor: f64,
 }
 
 impl Rating<'_> {
@@ -138,8 +138,8 @@ impl Rating<'_> {
     /// does not withstand. Repeats, since another pair may then open first. Returns the best round's sizes
     /// and its least load factor.
     fn enlarge(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), DesignError> {
-        let aim = self.asked + AIM;
-        let mut best = (self.division.chosen.clone(), least(bears));
+        let aim = self.least_factor + AIM;
+        let mut best = (self.division.sizes.clone(), least(bears));
         let (mut sizes, mut uses) = (best.0.clone(), bears.to_vec());
         for _ in 0..MOST_ROUNDS {
             let failing = uses.iter().filter(|b| b.deed.is_use() && factor(b) < aim);
@@ -147,7 +147,7 @@ impl Rating<'_> {
                 failing.filter_map(|b| Some((b, b.first?.between))).collect();
             let mut has_grown = false;
             for (load, pair) in parting {
-                has_grown |= sizes.raise(pair, load.deed.done());
+                has_grown |= sizes.raise(pair, load.deed.words());
             }
             if !has_grown {
                 break;
@@ -179,7 +179,7 @@ impl Rating<'_> {
         for _ in 0..MOST_WALLS {
             // Plates stiffen with the cube of their thickness, but openings shrink by less than that. The
             // plan that is found with this wall is stronger than the present one.
-            let wanted_mm = wall_mm * (self.asked / borne.max(0.1)).sqrt();
+            let wanted_mm = wall_mm * (self.least_factor / borne.max(0.1)).sqrt();
             let stepped_mm = (wanted_mm * WALLS_A_MM).ceil() / WALLS_A_MM;
             let next_mm = stepped_mm.max(wall_mm + 1.0 / WALLS_A_MM).min(most_mm);
             if next_mm <= wall_mm + 0.5 / WALLS_A_MM || !is_hollow(next_mm) {
@@ -187,7 +187,7 @@ impl Rating<'_> {
             }
             wall_mm = next_mm;
             borne = least(&self.uses(wall_mm, sizes)?);
-            if borne >= self.asked {
+            if borne >= self.least_factor {
                 break;
             }
         }
@@ -209,7 +209,7 @@ fn join(
     let united = segmentation::unite_two(&ctx.fork(), params, &division.surface, first.between)?;
     let warning = Warning::new(
         Cause::JoinedForUse {
-            done: weakest.deed.done().to_owned(),
+            load: weakest.deed.words().to_owned(),
         },
         Vec::new(),
         Some(first.at),
@@ -234,7 +234,7 @@ mod tests {
     const N: usize = 4;
 
     /// A press on the top with this load factor.
-    fn pressed(factor: f64) -> LoadBorne {
+    fn press(factor: f64) -> LoadBorne {
         LoadBorne {
             deed: Deed::PressTop,
             force_n: 70.0,
@@ -271,7 +271,7 @@ mod tests {
         let division = candidate.divide(&ctx, &job, candidate.surface.clone());
         let division = division.expect("sizes").expect("no key is cut");
         let (settings, surface) = (&division.settings.plan, &division.surface);
-        let sizes = &division.chosen.sizes;
+        let sizes = &division.sizes.sizes;
         let survey = survey(&ctx, settings, surface, &surface.seams(), sizes).expect("not stopped");
         let planning = Planning {
             input: ball.input(),
@@ -285,7 +285,7 @@ mod tests {
             loose: Vec::new(),
             seams: Vec::new(),
             n_compared: 1,
-            bears: vec![pressed(borne)],
+            bears: vec![press(borne)],
             foreseen_play: Vec::new(),
             foreseen_excess: Vec::new(),
         };

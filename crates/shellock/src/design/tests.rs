@@ -65,10 +65,10 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
 
 #[test]
 fn a_key_that_rattles_is_nobody_to_join() {
-    assert_eq!(rattling(2, 3.0).rattling(), []);
+    assert_eq!(kit_that_rattles(2, 3.0).rattling_pieces(), []);
     assert!(
-        rattling(2, 3.0).only_rattles()
-            && rattling(2, 1.5).only_rattles()
+        kit_that_rattles(2, 3.0).only_rattles()
+            && kit_that_rattles(2, 1.5).only_rattles()
             && !loose(1).only_rattles()
             && !good().only_rattles()
     );
@@ -77,12 +77,16 @@ fn a_key_that_rattles_is_nobody_to_join() {
 #[test]
 fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
     assert_eq!(lessons(&good()), []);
-    for failed in [loose(1), rattling(1, 3.0), kit(&[("closed", false)], Vec::new())] {
+    for failed in [
+        loose(1),
+        kit_that_rattles(1, 3.0),
+        kit(&[("closed", false)], Vec::new()),
+    ] {
         let mut constraints = PlanConstraints::default();
         lessons(&failed)
             .iter()
             .for_each(|lesson| lesson.teach(&mut constraints));
-        assert_eq!(constraints.rejected, [found_plan([0, 1, 2])]);
+        assert_eq!(constraints.rejections, [found_plan([0, 1, 2])]);
     }
 }
 
@@ -114,7 +118,7 @@ fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches
     );
     let mut constraints = PlanConstraints::default();
     learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
-    assert_eq!(constraints.rejected, [found_plan([2, 0, 1])]);
+    assert_eq!(constraints.rejections, [found_plan([2, 0, 1])]);
 }
 
 #[test]
@@ -130,13 +134,13 @@ fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
     let failed = kit(&[("free", false)], vec![rubs]);
     let learned = lessons(&failed);
     assert_eq!(
-        learned.iter().flat_map(Lesson::blamed).collect::<Vec<_>>(),
+        learned.iter().flat_map(Lesson::suspects).collect::<Vec<_>>(),
         [PatchId(1)]
     );
     let mut constraints = PlanConstraints::default();
     for times in 1..=2 {
         learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
-        assert_eq!(constraints.rubbed[&(PatchId(1), PatchId(0))], times);
+        assert_eq!(constraints.rubs[&(PatchId(1), PatchId(0))], times);
     }
     assert_eq!(
         constraints.forbidden,
@@ -249,7 +253,7 @@ pub(super) fn site() -> KeySite {
         side_share: 1.0,
         rail_mm: 0.0,
         area_mm2: 100.0,
-        shown: 0.0,
+        visibility: 0.0,
         score: 1.0,
     }
 }
@@ -264,12 +268,20 @@ fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
     // As many failures: the one that rattles less, and of equals the earlier.
     for (first, second, is_second) in [
         (loose(1), loose(0), false),
-        (loose_and_rattling(1, 1.5), loose_and_rattling(0, 2.5), false),
-        (loose_and_rattling(1, 2.5), loose_and_rattling(0, 1.5), true),
+        (
+            loose_kit_that_rattles(1, 1.5),
+            loose_kit_that_rattles(0, 2.5),
+            false,
+        ),
+        (
+            loose_kit_that_rattles(1, 2.5),
+            loose_kit_that_rattles(0, 1.5),
+            true,
+        ),
         (loose(1), worse(), false),
         (worse(), loose(0), true),
         (loose(1), good(), true),
-        (rattling(1, 1.5), loose(0), false),
+        (kit_that_rattles(1, 1.5), loose(0), false),
     ] {
         let better = if is_second { second.clone() } else { first.clone() };
         let made = Ball::new().design(vec![(Some(site()), Ok(first)), (None, Ok(second))]);
@@ -278,8 +290,8 @@ fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
 }
 
 /// Kit that comes loose and whose pieces rattle besides.
-fn loose_and_rattling(piece: u32, excess: f64) -> Kit {
-    let rattles = rattling(piece, excess).rattles;
+fn loose_kit_that_rattles(piece: u32, excess: f64) -> Kit {
+    let rattles = kit_that_rattles(piece, excess).rattles;
     Kit {
         rattles,
         ..loose(piece)
@@ -463,7 +475,7 @@ fn joined_pieces_count_as_another_division_only_if_they_can_be_made() {
     trial.take_division(Some(ball.job(N).surface));
     assert!(trial.begin(&ctx, &mut agenda).expect("not stopped").is_none());
     assert_eq!(trial.effort.segmentations, 1);
-    let sizes = trial.parts(&agenda).setup.division.chosen.clone();
+    let sizes = trial.parts(&agenda).setup.division.sizes.clone();
     trial
         .apply(&ctx, &mut agenda, Change::Enlarge(sizes))
         .expect("not stopped");

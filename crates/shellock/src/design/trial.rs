@@ -127,7 +127,7 @@ pub(super) struct Learned {
 
 impl Learned {
     pub fn add(&mut self, lesson: &Lesson) {
-        self.failure.blamed.extend(lesson.blamed());
+        self.failure.suspects.extend(lesson.suspects());
         lesson.teach(&mut self.constraints);
     }
 }
@@ -138,7 +138,7 @@ pub(super) struct Setup<'a> {
     pub division: Division,
     pub grid: WallGrid,
     pub survey: Option<PlanSurvey>,
-    pub learned: Learned,
+    pub lessons: Learned,
 }
 
 /// Layers of a trial that kits are made from.
@@ -159,7 +159,7 @@ pub(super) struct Trial<'a> {
     thin: Option<Wall>,
     job: Option<Job<'a>>,
     /// The first division, if it is known.
-    divided: Option<SegmentedSurface>,
+    division: Option<SegmentedSurface>,
     /// Sites for a key that is cut, best first.
     sites: Vec<KeySite>,
     setup: Option<Setup<'a>>,
@@ -174,7 +174,7 @@ impl<'a> Trial<'a> {
             thinnest,
             thin: None,
             job: None,
-            divided: None,
+            division: None,
             sites: Vec::new(),
             setup: None,
             effort: Effort::default(),
@@ -183,7 +183,7 @@ impl<'a> Trial<'a> {
 
     /// Takes the first division, where it is known.
     pub fn take_division(&mut self, divided: Option<SegmentedSurface>) {
-        self.divided = divided;
+        self.division = divided;
     }
 
     /// Returns the model as it is divided, and all sites for a key that is cut.
@@ -212,7 +212,7 @@ impl<'a> Trial<'a> {
     pub fn begin(&mut self, ctx: &Ctx, agenda: &mut Agenda) -> Result<Option<Failure>, DesignError> {
         self.forget();
         let wall = Arc::new(self.wall_of(ctx, agenda.way())?);
-        let job = match self.divided.take() {
+        let job = match self.division.take() {
             Some(surface) => Job::of(self.input, wall, surface)?,
             None => Job::new(ctx, self.input, wall)?,
         };
@@ -242,7 +242,7 @@ impl<'a> Trial<'a> {
             Change::Enlarge(sizes) => {
                 ctx.note("seams would open where it is used: larger connectors there");
                 if let Some(setup) = &mut self.setup {
-                    setup.division.chosen = sizes;
+                    setup.division.sizes = sizes;
                     setup.begin_division();
                 }
                 Ok(None)
@@ -264,12 +264,12 @@ impl<'a> Trial<'a> {
 
     fn wall_of(&mut self, ctx: &Ctx, way: Way) -> Result<Wall, DesignError> {
         if way.walls != Walls::Thin {
-            return Ok(self.thinnest.divided(way));
+            return Ok(self.thinnest.with_way(way));
         }
         if self.thin.is_none() {
             self.thin = Some(self.thinnest.thin(ctx, &self.input)?);
         }
-        Ok(self.thin.as_ref().unwrap_or(&self.thinnest).divided(way))
+        Ok(self.thin.as_ref().unwrap_or(&self.thinnest).with_way(way))
     }
 
     fn use_job(
@@ -309,7 +309,7 @@ impl<'a> Trial<'a> {
             division,
             grid: WallGrid::default(),
             survey: None,
-            learned: Learned::default(),
+            lessons: Learned::default(),
         };
         setup.begin_division();
         self.setup = Some(setup);
@@ -367,7 +367,7 @@ impl Setup<'_> {
             let Division {
                 surface,
                 settings,
-                chosen,
+                sizes: chosen,
                 ..
             } = &self.division;
             let (params, seams) = (&settings.plan, surface.seams());
@@ -379,8 +379,12 @@ impl Setup<'_> {
     /// Forgets lessons and measurements of other pieces, and makes sure that connectors will
     /// have room.
     fn begin_division(&mut self) {
-        let Division { settings, chosen, .. } = &self.division;
-        (self.survey, self.learned) = (None, Learned::default());
+        let Division {
+            settings,
+            sizes: chosen,
+            ..
+        } = &self.division;
+        (self.survey, self.lessons) = (None, Learned::default());
         self.grid
             .begin_division(settings.connector.room_mm(chosen.sizes.largest_mm()));
     }

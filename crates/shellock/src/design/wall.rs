@@ -26,7 +26,7 @@ pub(super) struct Wall {
 pub(super) struct Thicker {
     pub thickness_mm: f64,
     /// The use that asks for it, as in "pressed on its top".
-    pub done: String,
+    pub load: String,
 }
 
 impl Wall {
@@ -82,7 +82,7 @@ impl Wall {
     }
 
     /// This wall for pieces that are cut in another way.
-    pub fn divided(&self, way: Way) -> Self {
+    pub fn with_way(&self, way: Way) -> Self {
         let mut wall = self.clone();
         let segmentation = &mut wall.settings.segmentation;
         wall.is_divided_otherwise |= way.method != segmentation.method;
@@ -151,7 +151,7 @@ impl Wall {
             of_model(Cause::WallForUse {
                 from_mm: *from_mm,
                 to_mm: thicker.thickness_mm,
-                done: thicker.done.clone(),
+                load: thicker.load.clone(),
             })
         }));
         warnings
@@ -163,7 +163,7 @@ impl Thicker {
     pub fn words(&self) -> String {
         format!(
             "it would give way where it is {}: walls of {:.1} mm",
-            self.done, self.thickness_mm
+            self.load, self.thickness_mm
         )
     }
 }

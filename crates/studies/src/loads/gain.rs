@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use shellock::design::Settings;
-use shellock::handling::{Deed, Handling, LoadCase, borne};
+use shellock::handling::{Deed, Handling, LoadCase, load_factor};
 use shellock::metric::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 use shellock::plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanOutcome, PlanParams, random_plans, search,
@@ -33,11 +33,11 @@ pub fn sheets(
     let params = Settings::resolve(&options.subject.model.params()).plan;
     let (constraints, ctx) = (PlanConstraints::default(), Ctx::quiet());
     let found = found(&ctx, &params, subject, &constraints)?;
-    let counted = found.counted(&subject.survey);
+    let counted = found.apply_counts(&subject.survey);
     let most_cost = found.score.worst * options.slack;
     let around = Neighbourhood::new(&params, &counted, &constraints, &found, most_cost);
     let bench = Bench::new(handling, &subject.model).map_err(unsolved)?;
-    let first = bench.rated(found.pool[0].clone()).map_err(unsolved)?;
+    let first = bench.rate(found.pool[0].clone()).map_err(unsolved)?;
     let start = Instant::now();
     let budget = ClimbParams {
         n_solves,
@@ -48,7 +48,7 @@ pub fn sheets(
     let pace = pace(&top, start.elapsed().as_secs_f64());
     eprintln!(
         "{pace}; cost {:.3}, least {:.3}",
-        top.best.ranked.score.worst, found.score.worst
+        top.best.candidate.score.worst, found.score.worst
     );
 
     let plans = of_one_key(subject, options, &params, found.plan.key());
@@ -110,7 +110,7 @@ fn load_by_load(bench: &Bench<'_>, first: &Rated<'_>, best: &Rated<'_>) -> Strin
     let all = bench
         .cases
         .iter()
-        .zip(first.borne().into_iter().zip(best.borne()));
+        .zip(first.load_factors().into_iter().zip(best.load_factors()));
     table.extend(all.map(|(case, (from, to))| row(deed(&case.deed), from.factor, to.factor)));
     markdown(&["load", "the search's plan", "climbed"], &table)
 }
@@ -163,7 +163,7 @@ impl<'a> Scale<'a> {
         let mut least = f64::INFINITY;
         for load in &self.uses {
             let (bearing, _) = joined.bear(&meetings, load, None)?;
-            least = least.min(borne(&meetings, &bearing, self.strength_mpa).factor);
+            least = least.min(load_factor(&meetings, &bearing, self.strength_mpa).factor);
             if least < floor {
                 return Ok(None);
             }
@@ -177,7 +177,7 @@ impl<'a> Scale<'a> {
             .map(|plan| self.opening_mm(plan))
             .collect::<Result<_, _>>()?;
         let openings_a_second = plans.len() as f64 / start.elapsed().as_secs_f64();
-        let is_allowed = plans.par_iter().map(|plan| around.ranked(plan.clone()).is_some());
+        let is_allowed = plans.par_iter().map(|plan| around.rank(plan.clone()).is_some());
         let is_allowed: Vec<bool> = is_allowed.collect();
         let pairs = openings_mm.iter().zip(is_allowed);
         let mut allowed_mm: Vec<f64> = pairs.filter(|(_, a)| *a).map(|(mm, _)| *mm).collect();
@@ -207,7 +207,7 @@ fn openings(
     pace: &str,
 ) -> Result<String, SparseError> {
     let at = |share: f64| quantile(&drawn.openings_mm, share);
-    let rated = |plan: &Rated<'_>| Ok((scale.opening_mm(&plan.ranked.plan)?, plan.least()));
+    let rated = |plan: &Rated<'_>| Ok((scale.opening_mm(&plan.candidate.plan)?, plan.least()));
     let allowed = format!(
         "random, best of the {} that the climb may take",
         drawn.allowed_mm.len()

@@ -164,7 +164,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
     // The two pieces with most contacts visible from inside are shown, but not the key, which may leave.
     let seen = |p: PatchId| {
         let faces_viewer = |n: Vec3| n.dot(-outwards(p)) > 0.5;
-        made.touching
+        made.touches
             .iter()
             .filter(|c| c.a == p && faces_viewer(c.normal))
             .count()
@@ -179,7 +179,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
     for (i, &(_, piece)) in held.iter().take(2).enumerate() {
         let mut by_other: BTreeMap<PatchId, Vec<Vec3>> = BTreeMap::new();
         let mut n = 0;
-        for c in made.touching.iter().filter(|c| c.a == piece) {
+        for c in made.touches.iter().filter(|c| c.a == piece) {
             let (place, dots) = (c.point, by_other.entry(c.b).or_default());
             n += 1;
             if dots.iter().all(|dot| dot.distance(place) > APART_MM) {

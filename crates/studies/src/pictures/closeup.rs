@@ -46,7 +46,7 @@ fn places(kit: &Kit) -> Vec<Place> {
     let seams = made.surface.seams();
     made.joints
         .iter()
-        .filter(|j| j.length_mm > LEAST_MM && j.kept.iter().all(|&k| k > LEAST_KEPT))
+        .filter(|j| j.length_mm > LEAST_MM && j.intact_share.iter().all(|&k| k > LEAST_KEPT))
         .filter_map(|joint| {
             let pair = [joint.male.min(joint.female), joint.male.max(joint.female)];
             let (seam, i) = seams

@@ -1,6 +1,6 @@
 //! Section of the connector over the angle T, and of a rail, drawn from the parts that pieces are made of.
 
-use shellock::connector::{ConnectorParams, Part, RailPart, RunShape, RunStation, Section};
+use shellock::connector::{ConnectorParams, ProfileRect, RailPart, RunShape, RunStation, Section};
 use shellock_geom::Vec3;
 
 use super::sheet::{Sheet, WIDTH};
@@ -69,7 +69,7 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
     // x across the seam towards the female, y outwards; the inner side of the wall is y = 0.
     let on_sheet = |p: [f64; 2]| [at[0] + PX_PER_MM * p[0], at[1] - PX_PER_MM * p[1]];
     let parts = Section::at(&params, &station);
-    let draw = |sheet: &mut Sheet, parts: &[Option<Part>], fill: &str| {
+    let draw = |sheet: &mut Sheet, parts: &[Option<ProfileRect>], fill: &str| {
         for part in parts.iter().flatten() {
             let corners = part.corners(&station).map(|c| on_sheet([c.x, c.y]));
             sheet.polygon(&corners, fill, "");

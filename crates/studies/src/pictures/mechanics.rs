@@ -54,7 +54,7 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let words = "von Mises stress; the scale ends where all but 0.5 % of the hollow wall stay below";
     let bar = [0.5 * WIDTH - 150.0, VIEW[1] + 14.0];
     color_bar(&mut sheet, bar, 300.0, &format!("{most:.1} MPa"), words);
-    let (number, down) = strength.deciding;
+    let (number, down) = strength.decisive_fall;
     let note = format!(
         "fall {} of {}, down along ({:.2}, {:.2}, {:.2}); wall of {:.2} mm; the material bears {} MPa; \
          grey: too thin to be hollow",

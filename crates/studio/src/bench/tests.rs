@@ -5,7 +5,7 @@ use shellock_formats::{read_labels, write_ply};
 use shellock_testkit::shapes::torus;
 
 /// Saved key of the project, and the labels saved with it.
-fn saved(bench: &Bench) -> (String, Option<Vec<i64>>) {
+fn read_project(bench: &Bench) -> (String, Option<Vec<i64>>) {
     let file: toml::Table = std::fs::read_to_string(bench.store.project_file())
         .unwrap()
         .parse()
@@ -30,9 +30,9 @@ fn a_key_that_the_models_own_labels_name_is_the_same_after_painting_and_back() {
         .choose(&Map::from_iter([("key".to_owned(), json!("20"))]))
         .unwrap();
     bench.divide().unwrap();
-    assert_eq!(saved(&bench), ("20".to_owned(), None));
+    assert_eq!(read_project(&bench), ("20".to_owned(), None));
     bench.paint(&bench.labels().unwrap()).unwrap();
-    let (key, labels) = saved(&bench);
+    let (key, labels) = read_project(&bench);
     let labels = labels.expect("they were painted");
     let key: i64 = key.parse().unwrap();
     let of_key: Vec<i32> = (0..own.len())
@@ -46,7 +46,7 @@ fn a_key_that_the_models_own_labels_name_is_the_same_after_painting_and_back() {
         of_key.len()
     );
     bench.divide().unwrap();
-    assert_eq!(saved(&bench), ("20".to_owned(), None));
+    assert_eq!(read_project(&bench), ("20".to_owned(), None));
 }
 
 #[test]

@@ -51,7 +51,7 @@ impl Queue {
             return Next::Wait;
         }
         let (model, kit) = self.models.pop_front().expect("it was there");
-        self.started(Task {
+        self.start(Task {
             job: Entry { model, kit },
             needs_mb,
             first: None,
@@ -64,7 +64,7 @@ impl Queue {
         }
         match self.again.pop_front() {
             None => Next::Go,
-            Some((job, first)) => self.started(Task {
+            Some((job, first)) => self.start(Task {
                 job,
                 needs_mb: 0.0,
                 first: Some(first),
@@ -72,14 +72,14 @@ impl Queue {
         }
     }
 
-    fn started(&mut self, task: Task) -> Next {
+    fn start(&mut self, task: Task) -> Next {
         self.free_mb -= task.needs_mb;
         self.n_running += 1;
         Next::Make(task)
     }
 
     /// Frees the task's memory. Returns its record, or `None` if the model is to be made again.
-    pub fn ended(&mut self, task: Task, record: Record) -> Option<Record> {
+    pub fn finish(&mut self, task: Task, record: Record) -> Option<Record> {
         self.free_mb += task.needs_mb;
         self.n_running -= 1;
         if record.lacks_time && task.first.is_none() {
@@ -113,23 +113,23 @@ mod tests {
         let (a, b) = (task(&mut queue), task(&mut queue));
         assert!(matches!(queue.next(|_| 1.0), Next::Wait), "two fill the room");
         let of_a = record(&a, true);
-        assert!(queue.ended(a, of_a).is_none());
+        assert!(queue.finish(a, of_a).is_none());
         let c = task(&mut queue);
         let of_b = record(&b, true);
-        assert!(queue.ended(b, of_b).is_none());
+        assert!(queue.finish(b, of_b).is_none());
         let d = task(&mut queue);
         assert_eq!(d.job.model, Path::new("d"));
         let (of_c, of_d) = (record(&c, false), record(&d, false));
-        assert!(queue.ended(c, of_c).is_some());
+        assert!(queue.finish(c, of_c).is_some());
         assert!(matches!(queue.next(|_| 1.0), Next::Go), "d is still being made");
-        assert!(queue.ended(d, of_d).is_some());
+        assert!(queue.finish(d, of_d).is_some());
         for name in ["a", "b"] {
             let again = task(&mut queue);
             assert_eq!(again.job.model, Path::new(name));
             assert!(again.first.is_some());
             assert!(matches!(queue.next(|_| 1.0), Next::Go), "it is alone");
             let record = record(&again, name == "a");
-            assert!(queue.ended(again, record).is_some(), "twice is enough");
+            assert!(queue.finish(again, record).is_some(), "twice is enough");
         }
         assert!(matches!(queue.next(|_| 1.0), Next::Go));
     }

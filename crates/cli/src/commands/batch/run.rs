@@ -100,7 +100,7 @@ impl Run {
     /// Makes the kit unless it exists. If no kit results but the folder holds an earlier one, the record says
     /// so.
     pub fn record(&self, session: &Session, job: &Entry) -> Record {
-        let mut record = self.kept_or_made(session, job);
+        let mut record = self.keep_or_make(session, job);
         if !record.status.has_kit() && self.out.join(&job.kit).join(PLAN).is_file() {
             record.said.push(OLD_KIT.to_owned());
         }
@@ -110,7 +110,7 @@ impl Run {
     /// Makes again, alone and on all cores, a kit that ran out of time beside others.
     pub fn again(&self, session: &Session, job: &Entry, first: &Record) -> Record {
         let blank = Record::blank(job, first.made_of.clone());
-        let mut record = self.made(session, blank, job, true);
+        let mut record = self.make(session, blank, job, true);
         let second = (record.status, record.said.first().cloned().unwrap_or_default());
         let seconds = record.seconds + first.seconds;
         let is_worse = first.status.has_kit() && !record.status.has_kit();
@@ -132,10 +132,10 @@ impl Run {
             .into_iter()
             .flatten()
             .reduce(f64::max);
-        self.noted(session, record, job)
+        self.note(session, record, job)
     }
 
-    fn kept_or_made(&self, session: &Session, job: &Entry) -> Record {
+    fn keep_or_make(&self, session: &Session, job: &Entry) -> Record {
         let mut record = Record::blank(job, String::new());
         match read(&self.folder.join(&job.model)) {
             Ok(bytes) => record.made_of = sha256((sha256(&bytes) + &self.made_with).as_bytes()),
@@ -148,12 +148,12 @@ impl Run {
         if let Some(old) = Record::read(&file, &record.made_of, &self.out.join(&job.kit)) {
             return old;
         }
-        let record = self.made(session, record, job, self.n_workers == 1);
-        self.noted(session, record, job)
+        let record = self.make(session, record, job, self.n_workers == 1);
+        self.note(session, record, job)
     }
 
     /// Writes the record for the next run, unless this one is being stopped.
-    fn noted(&self, session: &Session, mut record: Record, job: &Entry) -> Record {
+    fn note(&self, session: &Session, mut record: Record, job: &Entry) -> Record {
         record.kit_is = kit_is(&self.out.join(&job.kit)).filter(|_| record.status.has_kit());
         if session.job.is_stopped() {
             return record;
@@ -163,7 +163,7 @@ impl Run {
         Record { unwritten, ..record }
     }
 
-    fn made(&self, session: &Session, mut record: Record, job: &Entry, is_alone: bool) -> Record {
+    fn make(&self, session: &Session, mut record: Record, job: &Entry, is_alone: bool) -> Record {
         let n_threads = if is_alone {
             self.cores
         } else {

@@ -55,7 +55,7 @@ pub(super) fn narrowest(skin: &[(Vec3, f64)]) -> Cone {
     }
     for step in STEPS_RAD {
         for _ in 0..MOST_STEPS {
-            let around = tilted(best.0, step).map(|axis| (axis, least_dot(axis)));
+            let around = directions_around(best.0, step).map(|axis| (axis, least_dot(axis)));
             let next = around
                 .into_iter()
                 .fold(best, |b, a| if a.1 > b.1 { a } else { b });
@@ -72,7 +72,7 @@ pub(super) fn narrowest(skin: &[(Vec3, f64)]) -> Cone {
 }
 
 /// Directions at `angle_rad` from `axis`, evenly around it.
-fn tilted(axis: Vec3, angle_rad: f64) -> [Vec3; N_WAYS] {
+fn directions_around(axis: Vec3, angle_rad: f64) -> [Vec3; N_WAYS] {
     let (u, v) = axis.any_orthonormal_pair();
     std::array::from_fn(|i| {
         let (sin, cos) = (std::f64::consts::TAU * i as f64 / N_WAYS as f64).sin_cos();

@@ -12,18 +12,18 @@ fn quarter(r_mm: f64) -> Volume {
     shell.intersect(&cuboid([0.0, 0.0, -2.0 * r_mm], [2.0 * r_mm; 3]))
 }
 
-fn engraved(r_mm: f64, number: u32) -> (Volume, Option<Volume>) {
+fn engrave(r_mm: f64, number: u32) -> (Volume, Option<Volume>) {
     let piece = quarter(r_mm);
     let params = LabelParams::default();
     let depth = |p: Vec3| Some(r_mm - p.length());
-    let cut = Wall::new(&params, piece.to_mesh(), WALL_MM, &depth).engraved(number);
+    let cut = Wall::new(&params, piece.to_mesh(), WALL_MM, &depth).engrave(number);
     (piece, cut)
 }
 
 #[test]
 fn a_number_is_cut_as_deep_as_asked_for_and_off_every_seam() {
     let r_mm = 25.0;
-    let (piece, cut) = engraved(r_mm, 47);
+    let (piece, cut) = engrave(r_mm, 47);
     let cut = cut.unwrap();
     let chips = piece.intersect(&cut);
     assert!(!chips.is_empty());
@@ -47,7 +47,7 @@ fn a_number_is_cut_as_deep_as_asked_for_and_off_every_seam() {
 
 #[test]
 fn what_is_too_small_or_too_thin_carries_no_number() {
-    assert!(engraved(6.0, 3).1.is_none());
+    assert!(engrave(6.0, 3).1.is_none());
     let piece = quarter(25.0);
     let depth = |p: Vec3| Some(25.0 - p.length());
     let params = LabelParams {
@@ -56,7 +56,7 @@ fn what_is_too_small_or_too_thin_carries_no_number() {
     };
     assert!(
         Wall::new(&params, piece.to_mesh(), WALL_MM, &depth)
-            .engraved(3)
+            .engrave(3)
             .is_none()
     );
 }

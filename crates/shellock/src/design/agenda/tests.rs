@@ -37,7 +37,7 @@ fn kit(n_failures: usize, rattle: f64) -> Report {
     }
 }
 
-fn offering(report: Report, offers: &[Step]) -> Report {
+fn with_offers(report: Report, offers: &[Step]) -> Report {
     Report {
         offers: offers.to_vec(),
         ..report
@@ -46,22 +46,22 @@ fn offering(report: Report, offers: &[Step]) -> Report {
 
 /// Kit that comes loose; another plan or other pieces may help.
 fn loose() -> Report {
-    offering(kit(1, 0.0), &[Step::Remake, Step::Divide])
+    with_offers(kit(1, 0.0), &[Step::Remake, Step::Divide])
 }
 
 /// Trial without a plan; other pieces may help.
 fn no_plan() -> Report {
-    offering(Report::default(), &[Step::Divide])
+    with_offers(Report::default(), &[Step::Divide])
 }
 
 /// Kit that passes but rattles.
-fn rattling() -> Report {
-    offering(kit(0, 1.5), &[Step::JoinRattling])
+fn kit_that_rattles() -> Report {
+    with_offers(kit(0, 1.5), &[Step::JoinRattling])
 }
 
 /// Kit that fails since a piece rattles far too much.
 fn rattling_too_much() -> Report {
-    offering(kit(1, 3.0), &[Step::JoinRattling])
+    with_offers(kit(1, 3.0), &[Step::JoinRattling])
 }
 
 /// Job whose trials end as `reply` says from their number and what they are allowed. A trial takes `plan_s`,
@@ -132,7 +132,7 @@ impl Story {
         format!(
             "way {}, load {}, wall {}, key {}: {result}",
             agenda.count(Step::NextWay) + 1,
-            agenda.asked(),
+            agenda.least_factor(),
             agenda.count(Step::Thicken),
             agenda.key() + 1
         )
@@ -146,7 +146,7 @@ fn weak(allowance: &Allowance, else_kit: Report) -> Report {
     if offers.is_empty() {
         else_kit
     } else {
-        offering(Report::default(), &offers)
+        with_offers(Report::default(), &offers)
     }
 }
 
@@ -161,7 +161,7 @@ fn stories() -> Vec<Story> {
         Story::new("every kit comes loose", |_, _, _| loose()),
         Story::new("there is never a plan", |_, _, _| no_plan()),
         Story::new("nothing can be made", |_, _, _| Report::default()),
-        Story::new("every kit passes and rattles", |_, _, _| rattling()),
+        Story::new("every kit passes and rattles", |_, _, _| kit_that_rattles()),
         Story::new("every kit rattles too much", |_, _, _| rattling_too_much()),
         Story::new(
             "every plan is weak and every kit comes loose",
@@ -174,7 +174,7 @@ fn stories() -> Vec<Story> {
         Story::new(
             "pieces are always predicted to rattle",
             |_, _, allowance| match allowance.is_allowed(Step::JoinPredicted) {
-                true => offering(Report::default(), &[Step::JoinPredicted]),
+                true => with_offers(Report::default(), &[Step::JoinPredicted]),
                 false => kit(0, 0.0),
             },
         ),
@@ -359,7 +359,7 @@ fn a_change_before_a_kit_is_made_though_the_time_ends_and_then_no_more_are_allow
         gone_s.store(0, Relaxed);
         assert!(agenda.allowance(&ctx).is_allowed(step));
         gone_s.store(20, Relaxed);
-        let offer = offering(Report::default(), &[step]);
+        let offer = with_offers(Report::default(), &[step]);
         assert_eq!(agenda.next(&ctx, &offer), Some(step));
     }
     let late = agenda.allowance(&ctx);

@@ -79,7 +79,7 @@ pub fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Fi
             foreseen_play: Vec::new(),
             foreseen_excess: Vec::new(),
         },
-        deformed: crate::metric::Deformed::default(),
+        deformation: crate::metric::Deformed::default(),
         thickness_mm: 2.0,
         pieces: ids().map(|_| TriMesh::default()).collect(),
         joints: Vec::new(),
@@ -89,7 +89,7 @@ pub fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Fi
             checks: checks.iter().map(|&(name, ok)| check(name, ok)).collect(),
             findings,
         },
-        touching: Vec::new(),
+        touches: Vec::new(),
         rattles: Vec::new(),
         play: KitPlay {
             slide,
@@ -110,7 +110,7 @@ pub fn good() -> Kit {
     kit(&[("holds", true)], Vec::new())
 }
 
-pub fn rattling(piece: u32, translation_mm: f64) -> Kit {
+pub fn kit_that_rattles(piece: u32, translation_mm: f64) -> Kit {
     let play = Play {
         translation_mm,
         rotation_deg: 0.0,
