@@ -296,7 +296,8 @@ fn is_close(answer: &Answer) -> bool {
     answer.proof.is_err() && !is_hopeless
 }
 
-/// Play of the only free piece, from an answer.
+/// Play of a piece that is free while all others are at rest: proven if the proof closed, else estimated for
+/// small motions; `None` without either.
 fn alone(answer: &Answer) -> Option<Play> {
     match &answer.proof {
         Ok(proof) => proof.plays().next().map(|(_, play)| play),

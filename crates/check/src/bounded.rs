@@ -259,7 +259,8 @@ impl Bounded {
         })
     }
 
-    /// Inequality of the slide of a free key.
+    /// Inequality of the slide: the key moves out of its seat by no more than the claimed slide. Fails if the
+    /// key is not among the free pieces.
     fn slide_row(&self, kit: &Kit<'_>) -> Result<Row, String> {
         let slide = kit.slide.ok_or("there is no slide to bound it")?;
         slide.test(kit)?;

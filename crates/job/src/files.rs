@@ -55,7 +55,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         })
 }
 
-/// Ending of a file's name, in lower case; empty if there is none.
+/// Extension of a file's name, without the dot and in lower case; empty if there is none.
 pub fn extension(path: &Path) -> String {
     path.extension()
         .map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase())

@@ -20,7 +20,7 @@ use shellock_report::PatchId;
 use super::score::{ASKED_MM3, FIRM_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};
 
-/// A set of directions, one bit for each index.
+/// Set of lattice directions; bit i stands for the direction with index i.
 pub type DirectionMask = u32;
 
 /// Mask of all 26 directions.

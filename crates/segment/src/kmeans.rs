@@ -63,7 +63,7 @@ impl KMeansParams {
     }
 }
 
-/// Divides `mesh` by k-means: the part of each face. No choice is random.
+/// Divides `mesh` by k-means, without randomness, and returns the part of each face.
 pub fn divide(params: &KMeansParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);

@@ -78,7 +78,7 @@ pub fn design(
         agenda.end_late();
         return Best::<Kit>::new().conclude(ctx, &input, &agenda, Effort::default());
     };
-    agenda.end_first_wall(ctx);
+    agenda.end_first_wall(ctx, params.thickness);
     let mut trial = Trial::new(input, wall);
     let best = explore(ctx, &mut agenda, &mut trial, attempt::make_kit, |kit: &Kit| {
         (kit.grade(), kit.failures())
@@ -254,7 +254,7 @@ pub fn plan(
         agenda.end_late();
         return Best::<Planned>::new().conclude(ctx, &agenda);
     };
-    agenda.end_first_wall(ctx);
+    agenda.end_first_wall(ctx, params.thickness);
     let mut trial = Trial::new(input, wall);
     let best = explore(ctx, &mut agenda, &mut trial, attempt::seek_plan, |_: &Planned| {
         (Grade::PERFECT, Vec::new())

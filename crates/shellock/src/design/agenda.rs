@@ -260,8 +260,8 @@ impl Agenda {
     }
 
     /// Measures the first wall, which tells how fast the machine is.
-    pub fn end_first_wall(&mut self, ctx: &Ctx) {
-        self.clock.end_first_wall(ctx);
+    pub fn end_first_wall(&mut self, ctx: &Ctx, thickness: Thickness) {
+        self.clock.end_first_wall(ctx, thickness == Thickness::Auto);
     }
 
     /// Learns what is expected of the present pieces.

@@ -2,8 +2,9 @@
 //!
 //! Costs are linear in the area of the surface, its triangles and the number of pieces, as the stages are:
 //! fields and cuts follow the area, the division follows the triangles, and contacts and connectors follow
-//! the pieces. The coefficients fit kits of 200 to 2200 cm² within a factor of 1.5 (docs/notes/time.md). The
-//! climb to a stronger plan is left out, since it takes as much time as it is given.
+//! the pieces. The coefficients fit first kits of 150 to 2200 cm² within a factor of 1.7, but for one that
+//! took thrice as long (docs/notes/time.md). The climb to a stronger plan is left out, since it takes as much
+//! time as it is given.
 
 use crate::SegmentedSurface;
 

@@ -304,7 +304,8 @@ impl Best<Kit> {
     }
 }
 
-/// Measures gaps, thin places and the play of printed pieces of a kit, and collects its warnings.
+/// Measures the gaps and thin places of a kit and the play that printing errors would give it, and collects
+/// the kit's warnings.
 fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Result<Design, DesignError> {
     let Kept {
         end: kit,

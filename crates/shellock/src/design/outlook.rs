@@ -127,7 +127,7 @@ pub fn outlook(
 }
 
 impl Verdict {
-    /// Grades a division that locks above one that is blocked. Of several blocked ones, the first is kept.
+    /// Grade of the verdict: no failure if the division locks, else one. Of equal grades the first is kept.
     fn grade(&self) -> Grade {
         Grade {
             n_failures: usize::from(matches!(self, Self::Blocked { .. })),

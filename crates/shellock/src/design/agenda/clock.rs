@@ -8,10 +8,9 @@
 use crate::Ctx;
 use crate::design::cost::Cost;
 
-/// Safety factor on the time that a kit is expected to take. It covers measuring gaps, writing files, and the
-/// spread between kits.
+/// Safety factor on the time that a trial is expected to take: kits differ, and gaps are measured at the end.
 const SPREAD: f64 = 1.5;
-/// Share of that time that must be left where nothing is lost by an attempt: estimates may be wrong by a
+/// Share of the expected time that must be left where an attempt costs nothing: estimates may be wrong by a
 /// factor of two.
 const HOPE: f64 = 0.4;
 /// Shortest time that tells how fast the machine is, s.
@@ -19,17 +18,19 @@ const LEAST_MEASURED_S: f64 = 0.3;
 /// Bounds of the machine's slowness, relative to the reference: what lies outside them is a wrong estimate.
 const SLOWNESS: std::ops::RangeInclusive<f64> = 0.2..=10.0;
 
-/// Clock of a job, with what was measured and what is expected of it. In seconds of its own kind.
+/// Clock of a job, with what was measured and what is expected of it. Seconds are of time, or of work.
 pub(super) struct Clock {
+    /// Seconds of the whole job; infinite without a limit.
     total_s: f64,
     /// Work that may be done and work that is done, s of the reference machine; `None` with a time limit.
     work_s: Option<[f64; 2]>,
-    /// Time that the first wall took; 0 if that is not known.
-    first_wall_s: f64,
-    /// Seconds left when the present wall and trial began.
-    wall_s: f64,
-    trial_s: f64,
-    /// Time of the slowest kit of the present way.
+    /// Time that was taken to choose the thickness of the first wall; `None` if the user gave it.
+    first_wall_s: Option<f64>,
+    /// Seconds left when the first wall was decided, and when the present wall and trial began.
+    left_after_wall_s: f64,
+    left_at_wall_s: f64,
+    left_at_trial_s: f64,
+    /// Time of the slowest trial with a kit, of the present way to divide.
     slowest_s: f64,
     /// Number of pieces of the last kit, which tells how fast a coarser one is made.
     n_pieces: usize,
@@ -37,18 +38,20 @@ pub(super) struct Clock {
     cost: Cost,
     /// Time of this machine for a second of the reference machine.
     slowness: f64,
+    /// True if something was left out for want of time.
     pub is_cut_short: bool,
 }
 
 impl Clock {
-    /// Clock of a job with so much time, s; infinite without a limit.
+    /// Clock of a job that may take this much time, s; infinite without a limit.
     pub fn of_time(total_s: f64) -> Self {
         Self {
             total_s,
             work_s: None,
-            first_wall_s: 0.0,
-            wall_s: total_s,
-            trial_s: total_s,
+            first_wall_s: None,
+            left_after_wall_s: total_s,
+            left_at_wall_s: total_s,
+            left_at_trial_s: total_s,
             slowest_s: 0.0,
             n_pieces: 0,
             cost: Cost::default(),
@@ -57,7 +60,7 @@ impl Clock {
         }
     }
 
-    /// Clock of a job with so much work, s of the reference machine.
+    /// Clock of a job that may take this much work, s of the reference machine.
     pub fn of_work(total_s: f64) -> Self {
         Self {
             work_s: Some([total_s, 0.0]),
@@ -73,9 +76,10 @@ impl Clock {
         }
     }
 
-    /// Measures the first wall.
-    pub fn end_first_wall(&mut self, ctx: &Ctx) {
-        self.first_wall_s = self.total_s - self.left_s(ctx);
+    /// Measures the first wall, which tells how fast the machine is if its thickness `is_sought`.
+    pub fn end_first_wall(&mut self, ctx: &Ctx, is_sought: bool) {
+        self.left_after_wall_s = self.left_s(ctx);
+        self.first_wall_s = is_sought.then_some(self.total_s - self.left_after_wall_s);
     }
 
     /// Learns what is expected of the present pieces, and at first how fast the machine is.
@@ -86,11 +90,10 @@ impl Clock {
             return;
         }
         self.count_division(true);
-        // The time of the wall is foreseen better than that of the division, but a given wall takes none.
-        let slowness = if self.first_wall_s > LEAST_MEASURED_S {
-            self.first_wall_s / cost.wall_s
-        } else {
-            (self.total_s - self.left_s(ctx)) / (cost.wall_s + cost.division_s)
+        // The search for a thickness is foreseen better than the division, but a given wall needs none.
+        let slowness = match self.first_wall_s {
+            Some(took_s) if took_s > LEAST_MEASURED_S => took_s / cost.wall_s,
+            _ => (self.left_after_wall_s - self.left_s(ctx)) / cost.division_s,
         };
         if self.work_s.is_none() && slowness.is_finite() {
             self.slowness = slowness.clamp(*SLOWNESS.start(), *SLOWNESS.end());
@@ -116,20 +119,20 @@ impl Clock {
     }
 
     pub fn begin_trial(&mut self, ctx: &Ctx) {
-        self.trial_s = self.left_s(ctx);
+        self.left_at_trial_s = self.left_s(ctx);
     }
 
     pub fn begin_wall(&mut self, ctx: &Ctx) {
-        self.wall_s = self.left_s(ctx);
+        self.left_at_wall_s = self.left_s(ctx);
     }
 
     pub fn begin_way(&mut self) {
         self.slowest_s = 0.0;
     }
 
-    /// Measures the trial of a kit of so many pieces.
+    /// Measures the trial of a kit that has `n_pieces` pieces.
     pub fn end_kit(&mut self, ctx: &Ctx, n_pieces: usize) {
-        let took_s = self.trial_s - self.left_s(ctx);
+        let took_s = self.left_at_trial_s - self.left_s(ctx);
         if took_s.is_finite() {
             self.slowest_s = self.slowest_s.max(took_s);
         }
@@ -141,7 +144,7 @@ impl Clock {
     pub fn is_too_late_for_wall(&self, ctx: &Ctx, reserved_s: f64) -> bool {
         let left_s = self.left_s(ctx) - reserved_s;
         let anew_s = self.slowness * (self.cost.wall_s + self.cost.division_s) + self.trial_s();
-        2.0 * left_s < self.wall_s - reserved_s || self.is_unlikely(left_s, anew_s)
+        2.0 * left_s < self.left_at_wall_s - reserved_s || self.is_unlikely(left_s, anew_s)
     }
 
     /// True if a change before a kit would end too late: another plan is sought, and then the kit is made.
@@ -151,15 +154,16 @@ impl Clock {
         left_s <= 0.0 || self.is_unlikely(left_s, expected_s)
     }
 
-    /// True if another trial would end too late, of which this share of its time is needed. If there is no
-    /// kit yet, all is tried that may succeed.
+    /// True if another trial, which takes `share` of the usual time, would end too late. If there is no kit
+    /// of this way yet, all is tried that may succeed.
     pub fn is_too_late_for_trial(&self, ctx: &Ctx, reserved_s: f64, share: f64) -> bool {
         let left_s = self.left_s(ctx) - reserved_s;
         let factor = if self.slowest_s > 0.0 { SPREAD } else { HOPE };
         left_s < share * factor * self.trial_s() || left_s <= 0.0
     }
 
-    /// True before the first kit if what is expected to take so long would probably not end in time.
+    /// True before the first kit of a way if work that is expected to take this long would hardly end in
+    /// time.
     fn is_unlikely(&self, left_s: f64, expected_s: f64) -> bool {
         self.slowest_s == 0.0 && left_s < SPREAD * expected_s
     }
@@ -177,11 +181,12 @@ impl Clock {
     /// Time that the whole job needs for its first kit; `None` where its pieces are not known.
     pub fn needed_s(&self, ctx: &Ctx) -> Option<f64> {
         let gone_s = self.total_s - self.left_s(ctx);
-        let planned_s = self.total_s - self.trial_s + self.slowness * self.cost.plan_s;
+        let planned_s = self.total_s - self.left_at_trial_s + self.slowness * self.cost.plan_s;
         (self.cost.kit_s > 0.0).then(|| planned_s.max(gone_s) + SPREAD * self.kit_s())
     }
 
-    /// Seconds kept for ways after the `i`-th of `n`: the first has twice as much as each other.
+    /// Seconds kept for the ways after the `i`-th of `n`: the first way has twice the share of each later
+    /// one.
     pub fn reserved_s(&self, i: usize, n: usize) -> f64 {
         if i + 1 == n || self.total_s.is_infinite() {
             0.0
@@ -240,7 +245,8 @@ mod tests {
 
     #[test]
     fn a_machine_half_as_fast_needs_twice_the_time_for_what_follows() {
-        for (gone_s, slowness) in [(5.0, 1.0), (10.0, 2.0), (0.1, 0.2), (90.0, 10.0)] {
+        // The wall was given, so the division of 2 s tells.
+        for (gone_s, slowness) in [(2.0, 1.0), (4.0, 2.0), (0.1, 0.2), (90.0, 10.0)] {
             after(gone_s, |ctx, clock, _| {
                 clock.foresee(ctx, COST);
                 clock.begin_trial(ctx);
@@ -256,7 +262,7 @@ mod tests {
     #[test]
     fn the_wall_tells_how_fast_the_machine_is_where_it_was_measured() {
         after(6.0, |ctx, clock, gone| {
-            clock.end_first_wall(ctx);
+            clock.end_first_wall(ctx, true);
             *gone.lock().expect("no test panics with it") = 60.0;
             clock.foresee(ctx, COST);
             assert!((clock.kit_reserve_s() - SPREAD * 16.0 * 2.0).abs() < 1e-9);
@@ -266,7 +272,7 @@ mod tests {
     #[test]
     fn before_the_first_kit_changes_leave_time_for_it_and_trials_are_given_up_last() {
         let late = |left_s: f64| {
-            after(5.0, |ctx, clock, gone| {
+            after(2.0, |ctx, clock, gone| {
                 clock.foresee(ctx, COST);
                 *gone.lock().expect("no test panics with it") = 100.0 - left_s;
                 let change = clock.is_too_late_for_change(ctx);

@@ -1,4 +1,5 @@
-//! Steps of the agenda, and the one table of how often each may be taken.
+//! Steps of the agenda, and the one table of how often each may be taken. The bounds of the user and of the
+//! way to divide (`Rounds`) may allow fewer.
 
 use super::CUT_KEYS;
 
@@ -64,8 +65,8 @@ const fn row(step: Step, begins: Level, within: Level, most: [usize; 2]) -> Row 
 /// No limit but the user's.
 pub(super) const ANY: usize = usize::MAX;
 
-/// All limits. A plan that is given up costs seconds, a joining that is predicted costs a search, and a kit
-/// costs most of a minute.
+/// Limits of all steps. A plan that is given up costs seconds, a joining that is predicted costs a search,
+/// and a kit costs most of a minute.
 pub(super) const TABLE: [Row; 11] = [
     row(Step::Replan, Level::Plan, Level::Division, [7, 7]),
     row(Step::Remake, Level::Plan, Level::Division, [1, ANY]),
