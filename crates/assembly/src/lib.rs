@@ -25,7 +25,7 @@
 //! let assembly = Assembly { model: None, pieces: &pieces, plan: &plan, press_fits: &[] };
 //! let params = VerifyParams { clearance_mm: 0.1, seed: 0 };
 //! let verdict = verify(&Ctx::quiet(), &params, &assembly)?;
-//! assert!(!verdict.verification.passed());
+//! assert!(!verdict.verification.has_passed());
 //! # Ok::<(), shellock_assembly::Cancelled>(())
 //! ```
 

@@ -133,7 +133,7 @@ impl Diagnostic for Cause {
                     named(pieces)
                 ),
             )
-            .by(&["size", "connector-size"]),
+            .by(&["size", "connector"]),
             Self::WeakGraph => Told::warning(
                 "weak-graph",
                 format!(
@@ -143,7 +143,7 @@ impl Diagnostic for Cause {
                     plural(pieces.len(), "holds", "hold")
                 ),
             )
-            .by(&["labels", "connector-size", "size"]),
+            .by(&["labels", "connector", "size"]),
             Self::KeepWholeCut { share } => Told::warning(
                 "keep-whole-cut",
                 format!(

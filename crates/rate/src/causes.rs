@@ -105,7 +105,7 @@ impl Diagnostic for Cause {
                     named(pieces)
                 ),
             )
-            .by(&["pieces", "connector-size"]),
+            .by(&["pieces", "connector"]),
             Self::PieceLoose => Told::warning(
                 "piece-loose",
                 format!(

@@ -14,7 +14,7 @@
 //! let mut params = Params::default();
 //! params.n_pieces = Some(8);
 //! if let DesignOutcome::Made(made) = design(&Ctx::quiet(), &params, &squirrel, None)? {
-//!     assert!(made.kit.verification.passed() && made.kit.pieces.len() >= 8);
+//!     assert!(made.kit.verification.has_passed() && made.kit.pieces.len() >= 8);
 //! }
 //! # Ok::<(), shellock::DesignError>(())
 //! ```
