@@ -81,6 +81,7 @@ class Warning:
     message: str
     pieces: Tuple[int, ...]
     at: Optional[Tuple[float, float, float]]
+    settings: Tuple[str, ...] = ()  # options that can change it, most helpful first
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ class Kit:
     def warnings(self) -> List[Warning]:
         """What matters most first."""
         def one(w: Mapping[str, Any]) -> Warning:
-            return Warning(w["code"], w["severity"], w["message"], tuple(w["pieces"]), tuple(w["at"]) if w["at"] else None)
+            at = tuple(w["at"]) if w["at"] else None
+            return Warning(w["code"], w["severity"], w["message"], tuple(w["pieces"]), at, tuple(w.get("settings", ())))
 
         return [one(w) for w in json.loads(self._native.warnings())]
 
