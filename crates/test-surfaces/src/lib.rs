@@ -50,6 +50,13 @@ pub fn voronoi(mesh: TriMesh, n_patches: usize, seed: u64) -> SegmentedSurface {
     label(mesh, n_patches, |p| nearest(&sites, p) as u32)
 }
 
+/// A ball of 40 mm radius about the origin, divided into its eight octants: bit k of a label is set where
+/// coordinate k is positive.
+pub fn octants() -> SegmentedSurface {
+    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
+    label(sphere(4, Vec3::splat(40.0)), 8, octant)
+}
+
 /// A seam in a horizontal surface through `points`, between pieces 0 and 1.
 pub fn level_seam(points: Vec<Vec3>) -> Seam {
     Seam {

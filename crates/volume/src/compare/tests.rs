@@ -2,14 +2,9 @@ use shellock_assembly::LatticeDirection;
 use shellock_plan::LatticeStep;
 use shellock_rate::stress_test::{FRICTION, Printed, StressReport, chart};
 use shellock_report::PatchId;
-use shellock_test_surfaces::{label, sphere};
+use shellock_test_surfaces::octants;
 
 use super::*;
-
-fn octants() -> SegmentedSurface {
-    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
-    label(sphere(4, Vec3::splat(40.0)), 8, octant)
-}
 
 /// A plan in which every octant leaves outwards.
 fn outwards() -> LatticePlan {

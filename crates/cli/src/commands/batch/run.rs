@@ -232,3 +232,18 @@ fn patience(seconds: f64) -> Result<Duration, Failure> {
     }
     Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_limited_unless_the_user_limits_time_or_work() {
+        let has = |words: &str, config: &str| {
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            has_limit(&words, config.as_bytes())
+        };
+        assert!(!has("--size 80 --plan-time 5", "size = 80"));
+        assert!(has("--time 0", "") && has("--effort=9", "") && has("--size 80", "time = 30"));
+    }
+}
