@@ -7,5 +7,6 @@ RUN scripts/release /dist && mkdir /release && tar -xzf /dist/*.tar.gz -C /relea
 
 FROM scratch
 COPY --from=build /release/shellock /release/shellock-check /bin/
+COPY --from=build /release/LICENSE-* /licenses/
 WORKDIR /work
 ENTRYPOINT ["/bin/shellock"]

@@ -18,17 +18,29 @@ pub enum Cause {
         figures: Vec<EstimatedPlay>,
         is_searched: bool,
     },
+    SurfacesCross {
+        by_mm: f64,
+        after_mm: f64,
+    },
+    ThinPlaces {
+        n_sheets: usize,
+        n_slots: usize,
+        longest_mm: f64,
+        thickness_mm: f64,
+        is_slot: bool,
+    },
+    WaysOutNotSought,
 }
 
 impl Diagnostic for Cause {
     fn tell(&self, pieces: &[PatchId]) -> Told {
+        let [first, second] = [number(pieces, 0), number(pieces, 1)];
         match self {
             Self::SmallOverlap { volume_mm3 } => Told::warning(
                 "small-overlap",
                 format!(
-                    "pieces {} and {} overlap by {volume_mm3:.3} mm³; sand the joint if it is tight",
-                    number(pieces, 0),
-                    number(pieces, 1)
+                    "pieces {first} and {second} overlap by {volume_mm3:.3} mm³; sand the joint if it is \
+                     tight"
                 ),
             ),
             Self::Rattles { loosest } => Told::warning(
@@ -46,6 +58,39 @@ impl Diagnostic for Cause {
             Self::NotProven { figures, is_searched } => {
                 Told::note("not-proven", not_proven(pieces, figures, *is_searched))
             }
+            Self::SurfacesCross { by_mm, after_mm } => Told::warning(
+                "surfaces-cross",
+                format!(
+                    "piece {first} rubs on piece {second} by {by_mm:.2} mm, {after_mm:.1} mm before it is \
+                     in place: sand it a little there"
+                ),
+            ),
+            Self::ThinPlaces {
+                n_sheets,
+                n_slots,
+                longest_mm,
+                thickness_mm,
+                is_slot,
+            } => Told::warning(
+                "thin-places",
+                format!(
+                    "{} {} {}; the longest is {longest_mm:.0} mm long and {thickness_mm:.2} mm {}; check \
+                     before you assemble",
+                    named(pieces),
+                    plural(pieces.len(), "has", "have"),
+                    thin_places(*n_sheets, *n_slots),
+                    if *is_slot { "wide" } else { "thick" },
+                ),
+            ),
+            Self::WaysOutNotSought => Told::warning(
+                "ways-out-not-sought",
+                format!(
+                    "the time was over before a way out was sought for {}, whose play is not proven; with \
+                     more time it is",
+                    named(pieces)
+                ),
+            )
+            .by(&["time"]),
         }
     }
 }
@@ -78,6 +123,21 @@ fn not_proven(pieces: &[PatchId], figures: &[EstimatedPlay], is_searched: bool) 
     )
 }
 
+/// Phrase such as "2 thin sheets, which may break off, and a hair slot, which may fuse".
+fn thin_places(n_sheets: usize, n_slots: usize) -> String {
+    let count = |n: usize, what: &str, risk: &str| match n {
+        0 => None,
+        1 => Some(format!("a {what}, which may {risk}")),
+        n => Some(format!("{n} {what}s, which may {risk}")),
+    };
+    let places = [
+        count(n_sheets, "thin sheet", "break off"),
+        count(n_slots, "hair slot", "fuse"),
+    ];
+    let places: Vec<String> = places.into_iter().flatten().collect();
+    places.join(", and ")
+}
+
 #[cfg(test)]
 mod tests {
     use shellock_report::LONGEST_SENTENCE;
@@ -95,6 +155,18 @@ mod tests {
                     rotation_deg: 13.9,
                 },
             },
+            Cause::SurfacesCross {
+                by_mm: 0.05,
+                after_mm: 12.3,
+            },
+            Cause::ThinPlaces {
+                n_sheets: 6,
+                n_slots: 4,
+                longest_mm: 8.0,
+                thickness_mm: 0.19,
+                is_slot: true,
+            },
+            Cause::WaysOutNotSought,
         ] {
             let sentence = cause.tell(&pieces).sentence;
             let n = sentence.chars().count();

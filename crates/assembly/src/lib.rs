@@ -32,6 +32,7 @@
 mod causes;
 pub mod certificate;
 pub mod direction;
+pub mod fit;
 pub mod motion;
 pub mod play;
 pub mod press_fit;
@@ -42,8 +43,9 @@ pub mod verify;
 
 pub use causes::{Cause, EstimatedPlay};
 pub use direction::{Direction, LatticeDirection};
+pub use fit::PrintedFit;
 pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};
 pub use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
-pub use verdict::{Verdict, verify};
+pub use verdict::{Judgement, Verdict, judge, verify};
 pub use verify::{Assembly, VerifyParams};

@@ -1,7 +1,10 @@
 //! Complete verdict on an assembly's lock, in one call.
 
+use shellock_report::Warning;
+
+use crate::causes::Cause;
 use crate::certificate::{Certificate, Evidence, PieceFile, certify};
-use crate::play::{self, KitPlay, PlayParams};
+use crate::play::{self, KitPlay, PlayParams, Rattle};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::contact::Contact;
 use crate::verify::{Assembly, Finding, Verification, VerifyParams, examine, reaches_far_out};
@@ -36,7 +39,18 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
     let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
     let is_sound = is_plan && !verification.findings.iter().any(is_open) && !reaches_far_out(assembly);
     let play = if is_sound {
-        Some(measure_play(ctx, params, assembly, &mut verification)?)
+        let VerifyParams { clearance_mm, seed } = *params;
+        let play_params = PlayParams {
+            clearance_mm,
+            slide_mm: play::SLIDE_MM,
+            is_together: false,
+            seed,
+        };
+        let (mut measured, _) = measure_play(ctx, &play_params, assembly, &mut verification)?;
+        play::look_for_ways_out(ctx, clearance_mm, assembly.pieces, &mut measured)?;
+        let ways_out = play::check_ways_out(&measured, assembly.pieces);
+        ways_out.into_iter().for_each(|check| verification.add(check));
+        Some(measured)
     } else {
         None
     };
@@ -49,28 +63,75 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
     })
 }
 
-/// Measures the play of the pieces, and adds it to the verdict.
+/// Measures the play of the pieces, and adds it to the verdict. Also returns the pieces that rattle.
 fn measure_play(
     ctx: &Ctx,
-    params: &VerifyParams,
+    params: &PlayParams,
     assembly: &Assembly<'_>,
     verification: &mut Verification,
-) -> Result<KitPlay, Cancelled> {
-    let VerifyParams { clearance_mm, seed } = *params;
-    let play_params = PlayParams {
-        clearance_mm,
-        slide_mm: play::SLIDE_MM,
-        is_together: false,
-        seed,
-    };
-    let mut measured = play::measure(ctx, &play_params, assembly.pieces, assembly.plan)?;
+) -> Result<(KitPlay, Vec<Rattle>), Cancelled> {
+    let measured = play::measure(ctx, params, assembly.pieces, assembly.plan)?;
     let size_mm = assembly.bounds().size().max_element();
-    let rattles = play::rattles(&measured, assembly.pieces, size_mm, clearance_mm);
+    let rattles = play::rattles(&measured, assembly.pieces, size_mm, params.clearance_mm);
     verification.add(play::check(&measured, &rattles));
-    play::look_for_ways_out(ctx, clearance_mm, assembly.pieces, &mut measured)?;
-    let ways_out = play::check_ways_out(&measured, assembly.pieces);
-    ways_out.into_iter().for_each(|check| verification.add(check));
-    Ok(measured)
+    Ok((measured, rattles))
+}
+
+/// Judgement of the pieces of a kit while it may still be given up for another: without exact gaps.
+#[derive(Clone, Debug)]
+pub struct Judgement {
+    /// Checks and their findings, those of play included.
+    pub verification: Verification,
+    /// Contacts between the pieces.
+    pub contacts: Vec<Contact>,
+    /// Play of the pieces.
+    pub play: KitPlay,
+    /// Pieces that rattle, the loosest first.
+    pub rattles: Vec<Rattle>,
+}
+
+impl Judgement {
+    /// Warnings of the pieces' play.
+    pub fn warnings(&self) -> impl Iterator<Item = Warning> + use<> {
+        let rattles = play::warning_of_rattles(&self.rattles);
+        rattles.into_iter().chain(play::warning(&self.play))
+    }
+}
+
+/// Judges closed pieces that are installed by a valid plan. Ways out are sought only for a kit that passes all
+/// other checks, since that is slow. If the time is over by then, a warning says which pieces it leaves open.
+///
+/// A function of its arguments alone, on any number of threads, as long as time is left.
+pub fn judge(
+    ctx: &Ctx,
+    params: &VerifyParams,
+    play: &PlayParams,
+    assembly: &Assembly<'_>,
+) -> Result<Judgement, Cancelled> {
+    let (mut verification, contacts) = examine(ctx, params, assembly)?;
+    let (mut measured, rattles) = measure_play(ctx, play, assembly, &mut verification)?;
+    if verification.has_passed() {
+        match play::look_for_ways_out(ctx, params.clearance_mm, assembly.pieces, &mut measured) {
+            // A kit outlives the end of the time in it, since it only confirms what holds.
+            Err(_) if ctx.is_time_over() => ctx.warn(way_out_warning(&measured)),
+            searched => searched?,
+        }
+        let ways_out = play::check_ways_out(&measured, assembly.pieces);
+        ways_out.into_iter().for_each(|check| verification.add(check));
+    }
+    Ok(Judgement {
+        verification,
+        contacts,
+        play: measured,
+        rattles,
+    })
+}
+
+/// Warning of pieces for which no way out was sought.
+fn way_out_warning(play: &KitPlay) -> Warning {
+    let key = play.slide.key;
+    let pieces = play.unproven().filter(|piece| *piece != key).collect();
+    Warning::new(Cause::WaysOutNotSought, pieces, None)
 }
 
 impl Verdict {

@@ -20,14 +20,16 @@
 //! Deviation from the paper: there the user draws the key.
 
 mod conditions;
+mod faces;
 mod imprint;
 mod prism;
 mod site;
 #[cfg(test)]
 mod tests;
 
-pub use conditions::{KeyConditions, conditions};
-pub use imprint::{imprint, patch_in};
+pub use conditions::{KeyConditions, conditions, warn_of_conditions};
+pub use faces::FaceSet;
+pub use imprint::{imprint, imprint_refined, patch_in};
 pub use prism::KeyPrism;
 use serde::{Deserialize, Serialize};
 pub use shellock_surface::Turn;

@@ -120,18 +120,7 @@ impl<'a> Begun<'a> {
         });
         let design = match designed? {
             DesignOutcome::Made(made) => made,
-            DesignOutcome::NoPlan {
-                reason,
-                blockers,
-                is_cut_short,
-                ..
-            } => {
-                let told = no_plan(&reason, &blockers, is_cut_short);
-                return Err(Failure::NoPlan {
-                    reason: told,
-                    is_cut_short,
-                });
-            }
+            DesignOutcome::NoPlan(none) => return Err(no_plan(&none)),
         };
         let mut notes = self.notes;
         if let Some(asked) = self
@@ -184,10 +173,7 @@ pub fn plan_model(
     let planned = with_limits(session, options, show, |ctx| {
         design::plan(ctx, params, &model.solid, model.labels.as_deref())
     });
-    planned?.map_err(|none| Failure::NoPlan {
-        reason: no_plan(&none.reason, &[], none.is_cut_short),
-        is_cut_short: none.is_cut_short,
-    })
+    planned?.map_err(|none| no_plan(&none))
 }
 
 /// Runs `work` with the limits that the options set: of work, which needs no clock, or of time.
@@ -215,7 +201,13 @@ fn with_limits<T>(
 }
 
 /// Reason why there is no kit, in words.
-fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker], is_cut_short: bool) -> String {
+fn no_plan(none: &NoPlan) -> Failure {
+    let NoPlan {
+        reason,
+        blockers,
+        is_cut_short,
+        ..
+    } = none;
     let mut text = match is_cut_short {
         true => format!("{reason}; give it more time (--time)"),
         false => format!("no plan was found: {reason}"),
@@ -229,5 +221,8 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker], is_cut_short: boo
             b.by, b.piece
         );
     }
-    text
+    Failure::NoPlan {
+        reason: text,
+        is_cut_short: *is_cut_short,
+    }
 }

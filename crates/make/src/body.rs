@@ -21,6 +21,7 @@
 //! rim. Where outer patches hide each other a little, only the seam shifts. The first-installed piece is the
 //! remainder.
 
+mod cache;
 mod chips;
 mod error;
 mod fragments;
@@ -30,6 +31,7 @@ mod sheets;
 #[cfg(test)]
 mod tests;
 
+pub use cache::WallGrid;
 pub use error::BodyError;
 pub(crate) use grid::outward;
 pub use grid::{GridError, LocalField, PatchDistances, ShellGrid};

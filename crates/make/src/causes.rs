@@ -8,16 +8,32 @@ use shellock_report::{Diagnostic, PatchId, Told};
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the sentences below say what each figure is")]
 pub enum Cause {
-    BodyInParts { dropped_mm3: f64 },
-    PartGiven { given_mm3: f64 },
+    BodyInParts {
+        dropped_mm3: f64,
+    },
+    PartGiven {
+        given_mm3: f64,
+    },
     PieceWithoutNumber,
     KeyWithoutRibs,
     KeyWithoutGrip,
+    KeyRibs {
+        n: usize,
+        interference_mm: f64,
+        travel_mm: f64,
+    },
+    Detent {
+        interference_mm: f64,
+        travel_mm: f64,
+    },
+    SeamWithoutConnector {
+        length_mm: f64,
+    },
 }
 
 impl Diagnostic for Cause {
     fn tell(&self, pieces: &[PatchId]) -> Told {
-        let first = number(pieces, 0);
+        let [first, second] = [number(pieces, 0), number(pieces, 1)];
         match self {
             Self::BodyInParts { dropped_mm3 } => Told::warning(
                 "body-in-parts",
@@ -61,6 +77,34 @@ impl Diagnostic for Cause {
                      middle is even"
                 ),
             ),
+            Self::KeyRibs {
+                n,
+                interference_mm,
+                travel_mm,
+            } => Told::note(
+                "key-ribs",
+                format!(
+                    "{n} ribs press on the key by {interference_mm:.2} mm over the last {travel_mm:.1} mm of \
+                     its way, on purpose, so that it stays in; file them down if it is too tight"
+                ),
+            ),
+            Self::Detent {
+                interference_mm,
+                travel_mm,
+            } => Told::note(
+                "detent",
+                format!(
+                    "over its last {travel_mm:.1} mm the key clicks past a bump of piece {first}, which is \
+                     {interference_mm:.2} mm too high for the groove on purpose"
+                ),
+            ),
+            Self::SeamWithoutConnector { length_mm } => Told::note(
+                "seam-without-connector",
+                format!(
+                    "the seam of {length_mm:.0} mm between pieces {first} and {second} has no connector; \
+                     other seams hold these pieces"
+                ),
+            ),
         }
     }
 
@@ -84,6 +128,16 @@ mod tests {
             Cause::PieceWithoutNumber,
             Cause::KeyWithoutRibs,
             Cause::KeyWithoutGrip,
+            Cause::KeyRibs {
+                n: 2,
+                interference_mm: 0.1,
+                travel_mm: 3.0,
+            },
+            Cause::Detent {
+                interference_mm: 0.1,
+                travel_mm: 3.0,
+            },
+            Cause::SeamWithoutConnector { length_mm: 12.4 },
         ] {
             let sentence = cause.tell(&pieces).sentence;
             let n = sentence.chars().count();

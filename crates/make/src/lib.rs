@@ -1,12 +1,15 @@
 //! Printable pieces of a plan.
 //!
 //! [`mod@body`] builds the wall and splits it along the plan, [`connector`] decides what is under each seam,
-//! and [`piece`] makes the finished meshes. [`coupon`] makes a pair of small pieces to test the fit.
+//! and [`piece`] makes the finished meshes; [`make()`] does all three. [`coupon`] makes a pair of small pieces to test the fit.
 
 pub mod body;
 mod causes;
 pub mod connector;
 pub mod coupon;
+mod handover;
 pub mod piece;
+mod recipe;
 
 pub use causes::Cause;
+pub use recipe::{MakeError, Recipe, SeamLengths, make, short_connectors};

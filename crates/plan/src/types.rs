@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 use shellock_assembly::{InstallationPlan, InstallationStep, LatticeDirection};
 use shellock_report::{IdVec, PatchId};
+use shellock_surface::Turn;
 
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;
@@ -68,6 +69,16 @@ pub struct Blocker {
     pub at: [f64; 3],
     /// Share of `piece` that `by` occludes along the best direction, in [0, 1].
     pub occluded: f64,
+}
+
+impl Blocker {
+    /// Moves the place to the model after a turn.
+    pub fn rotate(self, turn: &Turn) -> Self {
+        Self {
+            at: turn.apply(self.at.into()).to_array(),
+            ..self
+        }
+    }
 }
 
 /// A plan with its cost.

@@ -11,6 +11,7 @@ mod data_driven;
 mod deform;
 mod foreseen;
 mod foresight;
+mod handover;
 mod model;
 mod rating;
 #[cfg(test)]
@@ -28,4 +29,4 @@ pub use foreseen::{Foreseen, foreseen};
 pub use foresight::Foresight;
 pub use model::{MetricParams, PlanModel};
 pub use rating::{Bench, Rated};
-pub use what_if::bears_with;
+pub use what_if::{WhatIf, is_worth, weakest_use};

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             let (n, passed) = (made.kit.pieces.len(), made.kit.verification.has_passed());
             println!("{n} pieces; all checks hold: {passed}");
         }
-        DesignOutcome::NoPlan { reason, .. } => println!("no plan: {reason}"),
+        DesignOutcome::NoPlan(none) => println!("no plan: {}", none.reason),
     }
     Ok(())
 }

@@ -27,7 +27,7 @@ fn main() -> std::io::Result<()> {
         figure: figure.into(),
     };
     let warning = Warning::new(
-        shellock::causes::Design::SeamWithoutConnector { length_mm: 12.4 },
+        shellock::causes::Make::SeamWithoutConnector { length_mm: 12.4 },
         vec![PatchId(1), PatchId(2)],
         Some([0.0, 40.0, 118.0]),
     );

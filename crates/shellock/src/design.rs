@@ -13,17 +13,15 @@
 
 mod agenda;
 mod attempt;
+mod best;
 mod candidate;
 mod causes;
 mod cost;
 mod division;
-mod handover;
 mod kit;
 mod lesson;
 mod outcome;
 mod outlook;
-mod params;
-mod settings;
 mod strengthen;
 #[cfg(test)]
 mod tests;
@@ -34,22 +32,21 @@ mod ways;
 pub use agenda::Effort;
 use agenda::{Agenda, Allowance, Grade, Report, Step};
 use attempt::Found;
+use best::Best;
 pub use causes::Cause;
-use handover::Handover;
 pub use kit::Kit;
-use outcome::Best;
-pub use outcome::{Design, DesignError, DesignOutcome, NoPlan, PrintedFit};
+pub use outcome::{Design, DesignError, DesignOutcome, NoPlan};
 pub use outlook::{Outlook, Verdict, first_division, outlook};
-pub use params::{KeySource, Params, Rounds, Thickness};
-pub use settings::Settings;
+pub use shellock_assembly::PrintedFit;
 use shellock_geom::Solid;
+pub use shellock_settings::{KeySource, Params, Rounds, Settings, Thickness};
 use trial::{Change, Parts, Trial};
 use wall::Wall;
 use ways::Input;
 
 use crate::key::Turn;
 use crate::metric::{Chosen, Holding};
-use crate::plan::PlanProof;
+use crate::plan::{Handover, PlanProof};
 use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) if given. Kits are made until one passes or
@@ -73,21 +70,31 @@ pub fn design(
         model,
         labels,
     };
+    let grade = |kit: &Kit| (kit.grade(), kit.failures());
+    let (best, agenda, effort) = run(ctx, input, attempt::make_kit, grade)?;
+    best.conclude(ctx, &input, &agenda, effort)
+}
+
+/// Runs a job: decides the wall, then tries what the agenda says. Returns the best end with what it took.
+fn run<'a, T>(
+    ctx: &Ctx,
+    input: Input<'a>,
+    attempt: impl Fn(&Ctx<'_>, Parts<'_, 'a>, &Allowance) -> Result<Found<T>, DesignError>,
+    grade: impl Fn(&T) -> (Grade, Vec<String>),
+) -> Result<(Best<T>, Agenda, Effort), DesignError> {
     let mut agenda = Agenda::new(ctx, &input);
     let Some(wall) = in_time(ctx, |part| Wall::decide(part, &input))? else {
         agenda.end_late();
-        return Best::<Kit>::new().conclude(ctx, &input, &agenda, Effort::default());
+        return Ok((Best::new(), agenda, Effort::default()));
     };
-    agenda.end_first_wall(ctx, params.thickness);
+    agenda.end_first_wall(ctx, input.params.thickness);
     let mut trial = Trial::new(input, wall);
-    let best = explore(ctx, &mut agenda, &mut trial, attempt::make_kit, |kit: &Kit| {
-        (kit.grade(), kit.failures())
-    })?;
+    let best = explore(ctx, &mut agenda, &mut trial, attempt, grade)?;
     let effort = Effort {
         steps: agenda.words(),
         ..trial.effort
     };
-    best.conclude(ctx, &input, &agenda, effort)
+    Ok((best, agenda, effort))
 }
 
 /// Returns the parameters with the regions to keep whole as triangles of the model.
@@ -229,7 +236,7 @@ impl Planned {
             proof: handover.proof(proof),
             mean_cost,
             n_plans,
-            holding: handover.convert_holding(holding),
+            holding: holding.hand_over(&handover),
             warnings: [handover.warnings(of_plan), of_wall].concat(),
         }
     }
@@ -249,15 +256,7 @@ pub fn plan(
         model,
         labels,
     };
-    let mut agenda = Agenda::new(ctx, &input);
-    let Some(wall) = in_time(ctx, |part| Wall::decide(part, &input))? else {
-        agenda.end_late();
-        return Best::<Planned>::new().conclude(ctx, &agenda);
-    };
-    agenda.end_first_wall(ctx, params.thickness);
-    let mut trial = Trial::new(input, wall);
-    let best = explore(ctx, &mut agenda, &mut trial, attempt::seek_plan, |_: &Planned| {
-        (Grade::PERFECT, Vec::new())
-    })?;
+    let grade = |_: &Planned| (Grade::PERFECT, Vec::new());
+    let (best, agenda, _) = run(ctx, input, attempt::seek_plan, grade)?;
     best.conclude(ctx, &agenda)
 }

@@ -20,7 +20,7 @@ const ASSEMBLY: [&str; 9] = [
 ];
 
 /// Crates from the lowest up, each with those that its library or program may depend on.
-const FLOORS: [(&str, &[&str]); 22] = [
+const FLOORS: [(&str, &[&str]); 23] = [
     ("report", &[]),
     ("geom", &[]),
     ("formats", &["geom"]),
@@ -62,6 +62,18 @@ const FLOORS: [(&str, &[&str]); 22] = [
         &["report", "geom", "mechanics", "assembly", "surface", "plan"],
     ),
     (
+        "settings",
+        &[
+            "report",
+            "mechanics",
+            "assembly",
+            "divide",
+            "plan",
+            "rate",
+            "make",
+        ],
+    ),
+    (
         "shellock",
         &[
             "report",
@@ -74,6 +86,7 @@ const FLOORS: [(&str, &[&str]); 22] = [
             "plan",
             "rate",
             "make",
+            "settings",
         ],
     ),
     ("print", &["report", "geom", "mechanics", "render"]),

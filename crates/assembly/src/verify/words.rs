@@ -116,6 +116,28 @@ fn too_wide(play: &Play, [most_mm, most_deg]: [f64; 2]) -> String {
     format!("rattles {}", parts.join(", and "))
 }
 
+/// Describes the faults of a kit that fails these checks, each once.
+pub fn fault_words(checks: &[String]) -> String {
+    let mut words: Vec<&str> = Vec::new();
+    for check in checks {
+        let word = match check.as_str() {
+            "pieces sit within their play" => "a piece would rattle",
+            "every piece but the key is blocked"
+            | "no cluster but the key slides (translations)"
+            | "nothing but the key moves (6 dof)"
+            | "no piece can be worked out by hand" => "pieces would come loose",
+            "outer surface kept" => "some of the outer surface would be lost",
+            "every installation path is free" => "a piece would rub on its way in",
+            "assembled pieces do not overlap" => "pieces would overlap",
+            other => other,
+        };
+        if !words.contains(&word) {
+            words.push(word);
+        }
+    }
+    words.join(", ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,5 +178,16 @@ mod tests {
         assert_eq!(told(0.51, 1.0), "rattles by 0.51 mm, where 0.50 mm are allowed");
         assert_eq!(told(0.4, 2.5), "rattles by 2.50°, where 2.00° are allowed");
         assert_eq!(told(f64::INFINITY, 1.0), "moves without end");
+    }
+
+    #[test]
+    fn checks_that_mean_the_same_are_told_once() {
+        let failed = [
+            "every piece but the key is blocked",
+            "nothing but the key moves (6 dof)",
+            "a new one",
+        ];
+        let failed: Vec<String> = failed.map(String::from).into();
+        assert_eq!(fault_words(&failed), "pieces would come loose, a new one");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::causes::Cause;
 use shellock_geom::Vec3;
-use shellock_report::{PatchId, Warning};
+use shellock_report::{Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 use shellock_surface::plane::{Plane, Spot};
 
@@ -40,6 +40,22 @@ pub fn conditions(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Opti
         farthest,
         straight: longest_straight(surface, key, slide)?,
     })
+}
+
+/// Warns of the conditions that a `key` which was not cut breaks, see [`KeyConditions::problems`]; it slides out
+/// along a unit vector.
+pub fn warn_of_conditions(
+    ctx: &Ctx,
+    surface: &SegmentedSurface,
+    (key, slide): (PatchId, Vec3),
+    connector_mm: f64,
+    may_be_cut: bool,
+) {
+    if let Some(found) = conditions(surface, key, slide) {
+        for problem in found.problems(key, connector_mm, may_be_cut) {
+            ctx.warn(problem);
+        }
+    }
 }
 
 impl KeyConditions {

@@ -4,10 +4,11 @@ use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology, TriMesh};
-use shellock_report::PatchId;
+use shellock_report::{Ctx, PatchId};
 use shellock_surface::SegmentedSurface;
 
 use super::KeyPrism;
+use crate::segmentation::{SegmentationError, SegmentationParams, refined_again};
 
 /// Greatest edge length near the new seam, mm: corners are round to within a tenth of a millimetre.
 const EDGE_MM: f64 = 1.2;
@@ -54,6 +55,31 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
     };
     let key = patch_in(&surface, prism)?;
     (n_patches > 2).then_some((surface, key))
+}
+
+/// Returns the surface with the part in `prism` as a patch, and the id of that patch, as [`imprint`] does. If
+/// the key leaves a piece hanging on another, the pieces are refined first.
+pub fn imprint_refined(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    prism: &KeyPrism,
+) -> Result<Option<(SegmentedSurface, PatchId)>, SegmentationError> {
+    let faults = |s: &SegmentedSurface| {
+        s.contact_graph_below(params.wall_mm, params.least_contact_mm)
+            .n_faults()
+    };
+    let Some(mut best) = imprint(surface, prism) else {
+        return Ok(None);
+    };
+    if faults(&best.0) > 0
+        && let Some(refined) = refined_again(&ctx.fork(), params, &best.0)?
+        && let Some(again) = imprint(&refined, prism)
+        && faults(&again.0) < faults(&best.0)
+    {
+        best = again;
+    }
+    Ok(Some(best))
 }
 
 /// The patch with most of the surface in `prism`, if it contains nearly all of that and little else.

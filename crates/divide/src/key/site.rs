@@ -65,6 +65,16 @@ pub struct KeySite {
 }
 
 impl KeySite {
+    /// Describes the site for people.
+    pub fn words(&self) -> String {
+        let place = match self.visibility {
+            below if below < 0.2 => "underneath",
+            beside if beside < 0.8 => "at the side",
+            _ => "on top",
+        };
+        format!("a key of {:.1} cm² {place}", self.area_mm2 / 100.0)
+    }
+
     /// Returns the site, rotated by `turn`; its slide then is exactly `along`.
     pub fn rotate(&self, turn: &Turn, along: LatticeDirection) -> Self {
         let prism = KeyPrism {

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use shellock_plan::{FoundPlan, LatticePlan, RankedPlan};
+use shellock_report::PatchId;
 
 use super::choice::Choice;
 use super::{MetricParams, PlanModel, foreseen};
@@ -17,6 +18,9 @@ pub(super) const COST_SLACK: f64 = 0.25;
 /// Share of the allowed play below which pieces hardly ever rattle. The prediction is right within a factor
 /// of about one and a half.
 const SURE_PLAY: f64 = 0.85;
+
+/// Share of the allowed play above which pieces surely rattle.
+const SURE_RATTLE: f64 = 1.2;
 
 /// Relative difference of the widest play up to which plans count as alike.
 const PLAY_TIE: f64 = 0.05;
@@ -58,11 +62,11 @@ impl Foresight {
         foreseen(&self.model, plan, &meetings, self.size_mm, self.clearance_mm).excess
     }
 
-    /// The plan whose loosest piece has the least play, the first of equals, with the play of each piece as a
-    /// share of the allowed play.
-    pub fn steadiest(&self) -> Option<(&RankedPlan, &[f64])> {
-        let steadiest = (self.plans.iter()).min_by(|a, b| widest(&a.1).total_cmp(&widest(&b.1)))?;
-        Some((&steadiest.0, &steadiest.1))
+    /// Pieces but the key that surely rattle even in the plan whose loosest piece has the least play, the
+    /// loosest first.
+    pub fn rattling(&self) -> Vec<PatchId> {
+        let steadiest = (self.plans.iter()).min_by(|a, b| widest(&a.1).total_cmp(&widest(&b.1)));
+        steadiest.map_or_else(Vec::new, |(plan, excess)| loosest_first(plan.plan.key(), excess))
     }
 
     /// Plans with about the least play.
@@ -90,4 +94,18 @@ impl Foresight {
 /// Play of the loosest piece, as a share of the allowed play; at least the share that surely passes.
 fn widest(excess: &[f64]) -> f64 {
     excess.iter().copied().fold(SURE_PLAY, f64::max)
+}
+
+/// Pieces but the key whose play is surely wider than allowed, the loosest first; `excess` is the share of the
+/// allowed play.
+fn loosest_first(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
+    let excess = excess
+        .iter()
+        .enumerate()
+        .map(|(i, excess)| (PatchId::from(i), *excess));
+    let mut wide: Vec<(PatchId, f64)> = excess
+        .filter(|(piece, excess)| *excess > SURE_RATTLE && *piece != key)
+        .collect();
+    wide.sort_by(|a, b| b.1.total_cmp(&a.1));
+    wide.into_iter().map(|w| w.0).collect()
 }

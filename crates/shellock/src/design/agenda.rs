@@ -22,10 +22,9 @@ use serde::{Deserialize, Serialize};
 pub(super) use table::Step;
 use table::{ANY, Level, TABLE};
 
-use super::Thickness;
 use super::cost::Cost;
-use super::params::{Params, Rounds};
 use super::ways::{Input, Walls, Way, ways};
+use super::{Params, Rounds, Thickness};
 use crate::Ctx;
 use crate::sizes::SizeChoice;
 

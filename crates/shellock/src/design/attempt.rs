@@ -3,9 +3,9 @@
 use shellock_geom::Vec3;
 
 use super::agenda::{Allowance, Step};
-use super::division::{Division, join, revise};
+use super::division::{Division, revise};
 use super::kit::{Recipe, make};
-use super::lesson::{Lesson, lessons};
+use super::lesson::lessons;
 use super::strengthen::strengthen;
 use super::trial::{Change, Learned, Parts, Setup};
 use super::ways::Input;
@@ -14,7 +14,9 @@ use crate::body::BodyError;
 use crate::handling::Handling;
 use crate::key::Turn;
 use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
+use crate::plan::lesson::Lesson;
 use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::segmentation::join;
 use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
 
 /// Result of an attempt.
@@ -291,21 +293,6 @@ fn divide(
     Ok(surface.map(|surface| Change::Divide(Step::Divide, surface, None)))
 }
 
-/// Returns the pieces that are predicted to rattle far more than they may, the loosest first.
-fn predicted_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
-    /// Play is predicted within about this factor.
-    const SURELY: f64 = 1.2;
-    let excess = excess
-        .iter()
-        .enumerate()
-        .map(|(i, excess)| (PatchId::from(i), *excess));
-    let mut wide: Vec<(PatchId, f64)> = excess
-        .filter(|(p, excess)| *excess > SURELY && *p != key)
-        .collect();
-    wide.sort_by(|a, b| b.1.total_cmp(&a.1));
-    wide.into_iter().map(|w| w.0).collect()
-}
-
 /// Next thing to do with a division.
 pub(super) enum Next {
     /// Make the kit of this plan, the strongest of those with about the least cost. A lack of time may have
@@ -415,10 +402,12 @@ pub(super) fn next_plan(
             articulations,
         } => {
             let blocked = blockers.iter().map(|b| b.piece);
+            let suspects = articulations.into_iter().chain(blocked).collect();
+            let back = planning.turn.inverse();
             return Ok(Next::None(Failure {
-                suspects: articulations.into_iter().chain(blocked).collect(),
+                suspects,
                 reason,
-                blockers,
+                blockers: blockers.into_iter().map(|b| b.rotate(&back)).collect(),
                 ..Failure::default()
             }));
         }
@@ -429,12 +418,10 @@ pub(super) fn next_plan(
     let foresight = Foresight::of(&choice, &found);
     let mut late = None;
     if allowance.is_wanted(Step::JoinPredicted)
-        && let Some((plan, excess)) = foresight.steadiest()
+        && let rattling = foresight.rattling()
+        && !rattling.is_empty()
     {
-        let rattling = predicted_to_rattle(plan.plan.key(), excess);
-        if !rattling.is_empty() {
-            late = allowance.late(Step::JoinPredicted);
-        }
+        late = allowance.late(Step::JoinPredicted);
         if late.is_none()
             && let Some(fewer) = join(ctx, &settings.segmentation, surface, &rattling)?
         {
@@ -444,7 +431,10 @@ pub(super) fn next_plan(
     }
     let best = metric::choose(ctx, &choice, &foresight, *found)?;
     if settings.plan.key_slide.is_none() {
-        warn_of_key(ctx, planning, &best.search_result.plan);
+        let (plan, largest_mm) = (&best.search_result.plan, division.sizes.sizes.largest_mm());
+        let slide = plan.separation(plan.key()).unit();
+        let may_be_cut = !planning.input.params.key.is_cut();
+        key::warn_of_conditions(ctx, surface, (plan.key(), slide), largest_mm, may_be_cut);
     }
     let plan = (&best.search_result.pool[0], &best.holding);
     let (changes, late_change) = strengthen(ctx, planning, &handling, plan, allowance)?;
@@ -453,17 +443,4 @@ pub(super) fn next_plan(
         true => Next::Plan(Box::new(best), late),
         false => Next::Changes(changes, late),
     })
-}
-
-/// Warns of conditions for keys that an uncut key does not meet.
-fn warn_of_key(ctx: &Ctx, planning: &Planning<'_>, plan: &LatticePlan) {
-    let division = planning.division;
-    let may_be_cut = !planning.input.params.key.is_cut();
-    let Some(last) = plan.steps.last() else { return };
-    if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {
-        let largest_mm = division.sizes.sizes.largest_mm();
-        for problem in found.problems(last.piece, largest_mm, may_be_cut) {
-            ctx.warn(problem);
-        }
-    }
 }

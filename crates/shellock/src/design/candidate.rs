@@ -9,7 +9,6 @@ use super::trial::Job;
 use super::{DesignError, KeySource, Settings};
 use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
 use crate::piece::Grip;
-use crate::segmentation::{self, SegmentationError};
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, sizes};
 
 /// A key that is cut.
@@ -85,7 +84,9 @@ impl<'a> Candidate<'a> {
                 changes: Vec::new(),
             }));
         };
-        let Some((surface, patch)) = key.imprint(ctx, &given, &surface)? else {
+        let Some((surface, patch)) =
+            key::imprint_refined(ctx, &given.segmentation, &surface, &key.site.prism)?
+        else {
             return Ok(None);
         };
         let settings = given.with_key(patch, key.along);
@@ -127,32 +128,6 @@ impl<'a> Candidate<'a> {
 }
 
 impl CutKey {
-    /// Returns the surface with the key as a patch, and the id of that patch. If the key leaves a piece
-    /// hanging on another, the pieces are refined first.
-    fn imprint(
-        &self,
-        ctx: &Ctx,
-        settings: &Settings,
-        surface: &SegmentedSurface,
-    ) -> Result<Option<(SegmentedSurface, PatchId)>, SegmentationError> {
-        let params = &settings.segmentation;
-        let faults = |s: &SegmentedSurface| {
-            s.contact_graph_below(params.wall_mm, params.least_contact_mm)
-                .n_faults()
-        };
-        let Some(mut best) = key::imprint(surface, &self.site.prism) else {
-            return Ok(None);
-        };
-        if faults(&best.0) > 0
-            && let Some(refined) = segmentation::refined_again(&ctx.fork(), params, &best.0)?
-            && let Some(again) = key::imprint(&refined, &self.site.prism)
-            && faults(&again.0) < faults(&best.0)
-        {
-            best = again;
-        }
-        Ok(Some(best))
-    }
-
     /// Returns a notch across the key, nearer to its front.
     fn grip(&self, key: PatchId) -> Grip {
         /// Position of the notch from the key's back, as a share of the key's length.
@@ -188,14 +163,4 @@ pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
             _ => None,
         },
     }
-}
-
-/// Describes a site for people.
-pub(super) fn words(site: &KeySite) -> String {
-    let place = match site.visibility {
-        below if below < 0.2 => "underneath",
-        beside if beside < 0.8 => "at the side",
-        _ => "on top",
-    };
-    format!("a key of {:.1} cm² {place}", site.area_mm2 / 100.0)
 }

@@ -1,14 +1,12 @@
 //! End of a job: the best kit with its measurements, or the reason why there is none.
 
-use std::sync::Arc;
-
+use shellock_assembly::{PrintedFit, fit};
 use shellock_geom::TriMesh;
+use shellock_make::MakeError;
 
-use super::agenda::{Agenda, Effort, Grade};
-use super::attempt::Failure;
-use super::candidate;
+use super::agenda::{Agenda, Effort};
+use super::best::{Best, Kept};
 use super::causes::Cause;
-use super::wall::Wall;
 use super::ways::Input;
 use super::{KeySource, Kit, Planned, Settings};
 use crate::body::{BodyError, GridError};
@@ -16,12 +14,11 @@ use crate::key::KeySite;
 use crate::metric::ChoiceError;
 use crate::piece::PieceError;
 use crate::plan::Blocker;
-use crate::play;
 use crate::segmentation::{self, SegmentationError};
 use crate::strength::{NoRoom, Strength, StrengthError, TooThin};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
-use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
+use crate::verify::{ThinFeature, thin_places};
 use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// Finished kit and the wall that it is made of. Places are in the space of the model as given.
@@ -48,33 +45,12 @@ pub struct Design {
     pub warnings: Vec<Warning>,
 }
 
-/// Effect of printing errors on a kit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PrintedFit {
-    /// Largest distance by which every printed face may lie too far outwards, mm. Half of the least gap
-    /// between two pieces, at rest and on any way out; gaps of a key with ribs or bumps, which press on
-    /// purpose, do not count. ≤ 0 if surfaces cross; `None` if no two pieces come near each other.
-    pub within_mm: Option<f64>,
-    /// Piece with the most play, for small motions, if every face lies `within_mm` too far inwards, and that
-    /// play; endless if the piece comes loose. `None` if the kit fails, or if `within_mm` is not positive.
-    pub loosest: Option<(PatchId, Play)>,
-}
-
 /// End of the job.
 pub enum DesignOutcome {
     /// A kit was made. It may have failed its verification.
     Made(Box<Design>),
     /// No plan was found for any division that was tried.
-    NoPlan {
-        /// Reason why there is no plan, for people.
-        reason: String,
-        /// Pieces that block the way out of others.
-        blockers: Vec<Blocker>,
-        /// True if the time was over before all was tried: with more of it one may be found.
-        is_cut_short: bool,
-        /// Time that the first kit needs in all, s, where that can be said.
-        needed_s: Option<f64>,
-    },
+    NoPlan(NoPlan),
 }
 
 /// Reason why there is no plan.
@@ -83,187 +59,21 @@ pub enum DesignOutcome {
 pub struct NoPlan {
     /// Explanation of the failure, for people.
     pub reason: String,
+    /// Pieces that block the way out of others.
+    pub blockers: Vec<Blocker>,
     /// True if the time was over before all was tried: with more of it one may be found.
     pub is_cut_short: bool,
     /// Time that the first kit needs in all, s, where that can be said.
     pub needed_s: Option<f64>,
 }
 
-/// The best end so far, a kit or a plan, and the reasons why other trials failed.
-pub(super) struct Best<T> {
-    entry: Option<Kept<T>>,
-    /// Reasons why keys that were cut with the present wall fail, for people.
-    reasons: Vec<String>,
-    /// First failure with a piece as the key.
-    failure: Option<Failure>,
-    /// Last error with a piece as the key, or of a model that could not be divided.
-    error: Option<DesignError>,
-    /// Failure of the present key so far.
-    present: Failure,
-    /// Grade of the best end with the present key, and its faults for people.
-    of_key: Option<(Grade, Vec<String>)>,
-}
-
-/// An end with what it was made of.
-struct Kept<T> {
-    end: T,
-    grade: Grade,
-    key: Option<KeySite>,
-    wall: Arc<Wall>,
-    /// Reasons why keys that were cut with its wall fail.
-    reasons: Vec<String>,
-}
-
-impl<T> Best<T> {
-    pub fn new() -> Self {
-        Self {
-            entry: None,
-            reasons: Vec::new(),
-            failure: None,
-            error: None,
-            present: Failure::default(),
-            of_key: None,
-        }
-    }
-
-    /// Keeps an end, with these `faults`, if its grade is better than that of the best one so far. Of equals,
-    /// the earlier one stays.
-    pub fn offer(
-        &mut self,
-        end: T,
-        (grade, faults): (Grade, Vec<String>),
-        key: Option<KeySite>,
-        wall: &Arc<Wall>,
-    ) {
-        if self
-            .of_key
-            .as_ref()
-            .is_none_or(|(best, _)| grade.is_better_than(best))
-        {
-            self.of_key = Some((grade, faults));
-        }
-        if self
-            .entry
-            .as_ref()
-            .is_none_or(|kept| grade.is_better_than(&kept.grade))
-        {
-            self.entry = Some(Kept {
-                end,
-                grade,
-                key,
-                wall: wall.clone(),
-                reasons: self.reasons.clone(),
-            });
-        }
-    }
-
-    /// Keeps the reason why the present trial fails.
-    pub fn fail(&mut self, failure: Failure) {
-        if !failure.reason.is_empty() {
-            self.present = failure;
-        }
-    }
-
-    /// Closes a key: its failure becomes a reason for people, or the failure of the job.
-    pub fn close_key(&mut self, ctx: &Ctx, site: Option<&KeySite>) {
-        let failure = std::mem::take(&mut self.present);
-        let kit = self.of_key.take().map(|(_, faults)| faults);
-        let Some(site) = site else {
-            if kit.is_none() && !failure.reason.is_empty() {
-                self.failure.get_or_insert(failure);
-            }
-            return;
-        };
-        let words = candidate::words(site);
-        let reason = match kit {
-            Some(faults) if faults.is_empty() => return,
-            Some(faults) => format!("{words}: {}", plainly(&faults)),
-            None if failure.reason.is_empty() => return,
-            None => format!("{words}: no plan, as {}", failure.reason),
-        };
-        self.reject(ctx, reason);
-    }
-
-    /// Closes a key that cannot be made. The error is the job's only if a piece is the key and no kit was
-    /// made.
-    pub fn close_key_with(&mut self, ctx: &Ctx, site: Option<&KeySite>, error: DesignError) {
-        (self.present, self.of_key) = (Failure::default(), None);
-        match site {
-            Some(site) => self.reject(ctx, format!("{} cannot be made: {error}", candidate::words(site))),
-            None => {
-                if self.has_end() {
-                    ctx.note(&format!("with a piece as the key it cannot be made: {error}"));
-                }
-                self.error = Some(error);
-            }
-        }
-    }
-
-    pub fn has_end(&self) -> bool {
-        self.entry.is_some()
-    }
-
-    /// Reason to divide in another way, for people.
-    pub fn words(&self) -> String {
-        match (&self.entry, &self.error) {
-            (Some(_), _) => "no kit of these pieces passes".to_owned(),
-            (None, Some(error)) => format!("these pieces cannot be made: {error}"),
-            (None, None) => "these pieces have no plan".to_owned(),
-        }
-    }
-
-    /// Begins another wall, whose keys fail for reasons of their own.
-    pub fn begin_wall(&mut self) {
-        self.reasons.clear();
-    }
-
-    /// Returns the best end; fails with the error of the job if there is none.
-    pub fn into_end(self) -> Result<Option<T>, DesignError> {
-        match (self.entry, self.error) {
-            (Some(kept), _) => Ok(Some(kept.end)),
-            (None, Some(error)) => Err(error),
-            (None, None) => Ok(None),
-        }
-    }
-
-    fn reject(&mut self, ctx: &Ctx, reason: String) {
-        ctx.note(&reason);
-        self.reasons.push(reason);
-    }
-
-    /// Reason why there is no end: a failure, else an error, else nothing but a lack of time.
-    fn why(self) -> Result<Failure, DesignError> {
-        match (self.failure, self.error) {
-            (Some(failure), _) => Ok(failure),
-            (None, Some(error)) => Err(error),
-            (None, None) => Ok(self.present),
-        }
-    }
-}
-
 impl Best<Planned> {
     /// Concludes a job that seeks a plan.
     pub fn conclude(self, ctx: &Ctx, agenda: &Agenda) -> Result<Result<Planned, NoPlan>, DesignError> {
-        let is_cut_short = agenda.is_cut_short();
-        if let Some(kept) = self.entry {
+        Ok(self.into_answer(ctx, agenda)?.map(|kept| {
             let mut planned = kept.end;
-            planned.warnings.extend(is_cut_short.then(|| time_up(0)));
-            return Ok(Ok(planned));
-        }
-        let reason = match self.why() {
-            Ok(failure) => failure.reason,
-            Err(error) if is_cut_short => error.to_string(),
-            Err(error) => return Err(error),
-        };
-        let needed_s = agenda.needed_s(ctx).filter(|_| is_cut_short);
-        Ok(Err(NoPlan {
-            reason: if is_cut_short {
-                report_lateness(&reason, needed_s)
-            } else {
-                reason
-            },
-            is_cut_short,
-            needed_s,
+            planned.warnings.extend(agenda.is_cut_short().then(|| time_up(0)));
+            planned
         }))
     }
 }
@@ -277,29 +87,15 @@ impl Best<Kit> {
         agenda: &Agenda,
         effort: Effort,
     ) -> Result<DesignOutcome, DesignError> {
-        let is_cut_short = agenda.is_cut_short();
-        let Some(kept) = self.entry else {
-            let failure = match self.why() {
-                // Other pieces that were left out might have been made.
-                Err(error) if is_cut_short => Failure::of(&error.to_string()),
-                why => why?,
-            };
-            let needed_s = agenda.needed_s(ctx).filter(|_| is_cut_short);
-            return Ok(DesignOutcome::NoPlan {
-                reason: if is_cut_short {
-                    report_lateness(&failure.reason, needed_s)
-                } else {
-                    failure.reason
-                },
-                blockers: failure.blockers,
-                is_cut_short,
-                needed_s,
-            });
+        let kept = match self.into_answer(ctx, agenda)? {
+            Ok(kept) => kept,
+            Err(none) => return Ok(DesignOutcome::NoPlan(none)),
         };
         let mut design = finish(ctx, input, kept, effort)?;
+        let kits = design.effort.kits;
         design
             .warnings
-            .extend(is_cut_short.then(|| time_up(design.effort.kits)));
+            .extend(agenda.is_cut_short().then(|| time_up(kits)));
         Ok(DesignOutcome::Made(Box::new(design)))
     }
 }
@@ -322,7 +118,8 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
         &kit.plan,
         settings.body.rim_mm,
     )?;
-    let fit = PrintedFit::of(ctx, &kit, &gaps)?;
+    let has_passed = kit.verification.has_passed();
+    let fit = PrintedFit::of(ctx, &kit.assembly(input.model), &gaps, &kit.play, has_passed)?;
     let least_wall_mm = settings.connector.min_wall_mm;
     let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
     let thin: IdVec<PatchId, Vec<ThinFeature>> = kit.pieces.as_slice().iter().map(thin).collect();
@@ -337,8 +134,8 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
     let mut warnings = ctx.into_warnings();
     warnings.extend(kit.warnings.iter().cloned());
     warnings.extend(wall.warnings());
-    warnings.extend(crossing_warning(&kit, &gaps));
-    warnings.extend(thin_in_all(&thin));
+    warnings.extend(fit::crossing_warning(&kit.assembly(input.model), &gaps));
+    warnings.extend(fit::thin_warning(&thin));
     warnings.extend(key_warning(input, &kit, key.as_ref(), reasons));
     Ok(Design {
         kit,
@@ -384,22 +181,8 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
 }
 
 /// Warns that the time was over after so many kits; after none, the warning speaks of the plan.
-pub(super) fn time_up(kits: usize) -> Warning {
+fn time_up(kits: usize) -> Warning {
     Warning::new(Cause::TimeUp { kits }, Vec::new(), None)
-}
-
-/// Reason why there is no kit where the time was over: the time that the first one needs, and what failed so
-/// far.
-pub(super) fn report_lateness(reason: &str, needed_s: Option<f64>) -> String {
-    /// Step of the time that is told, s.
-    const STEP_S: f64 = 10.0;
-    let needed = needed_s.map_or_else(String::new, |s| {
-        format!("; a kit takes about {:.0} s", (s / STEP_S).ceil() * STEP_S)
-    });
-    match reason {
-        "" => format!("the time was over before a kit was made{needed}"),
-        reason => format!("the time was over before a kit was made{needed}; so far {reason}"),
-    }
 }
 
 /// Warns that a cut key has no rails.
@@ -410,88 +193,6 @@ fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
         vec![key],
         Some(site.prism.origin.to_array()),
     )
-}
-
-/// Warns of pieces with sheets that may break off or slots that may fuse.
-fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
-    let all = || thin.as_slice().iter().flatten();
-    let longest = all().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
-    let n_sheets = all().filter(|place| place.kind == ThinKind::Sheet).count();
-    Some(Warning::new(
-        Cause::ThinPlaces {
-            n_sheets,
-            n_slots: all().count() - n_sheets,
-            longest_mm: longest.length_mm,
-            thickness_mm: longest.thickness_mm,
-            is_slot: longest.kind == ThinKind::Slot,
-        },
-        thin.iter()
-            .filter(|(_, places)| !places.is_empty())
-            .map(|(p, _)| p)
-            .collect(),
-        Some(longest.at),
-    ))
-}
-
-impl PrintedFit {
-    fn of(ctx: &Ctx, kit: &Kit, gaps: &KitGaps) -> Result<Self, Cancelled> {
-        let within_mm = fits_within_mm(kit, gaps);
-        let tried_mm = within_mm.filter(|mm| *mm > 0.0 && kit.verification.has_passed());
-        let loosest = tried_mm.map(|mm| {
-            let plays = play::printed_thin(ctx, &kit.pieces, &kit.play, mm)?;
-            let plays = plays
-                .iter()
-                .map(|(piece, play)| (piece, play.unwrap_or(Play::ENDLESS)));
-            Ok(plays.max_by(|a, b| a.1.translation_mm.total_cmp(&b.1.translation_mm)))
-        });
-        Ok(Self {
-            within_mm,
-            loosest: loosest.transpose()?.flatten(),
-        })
-    }
-}
-
-/// Returns half of the least gap between pieces that do not press on purpose, mm.
-fn fits_within_mm(kit: &Kit, gaps: &KitGaps) -> Option<f64> {
-    let (key, presses) = (kit.plan.key(), !kit.press_fits.is_empty());
-    let is_pressed = |a: PatchId, b: PatchId| presses && (a == key || b == key);
-    let at_rest = gaps
-        .pairs
-        .iter()
-        .filter(|p| !is_pressed(p.a, p.b))
-        .map(|p| p.overall.gap_mm);
-    let on_ways = gaps
-        .paths
-        .iter()
-        .filter(|p| !is_pressed(p.piece, p.against))
-        .map(|p| p.overall.gap_mm);
-    at_rest
-        .chain(on_ways)
-        .min_by(f64::total_cmp)
-        .map(|gap_mm| 0.5 * gap_mm)
-}
-
-/// Warns of the deepest crossing of finished pieces, on a way out or at rest, unless it is a key
-/// with press fits that crosses.
-fn crossing_warning(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
-    /// Least depth that is not rounding, mm.
-    const LEAST_MM: f64 = 0.02;
-    let deepest = gaps
-        .paths
-        .iter()
-        .min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
-    let place = deepest.overall;
-    let is_meant = deepest.piece == kit.plan.key() && !kit.press_fits.is_empty();
-    (place.gap_mm < -LEAST_MM && !is_meant).then(|| {
-        Warning::new(
-            Cause::SurfacesCross {
-                by_mm: -place.gap_mm,
-                after_mm: place.travel_mm,
-            },
-            vec![deepest.piece, deepest.against],
-            Some(place.at),
-        )
-    })
 }
 
 /// Reason why the job could not be done.
@@ -546,48 +247,19 @@ macro_rules! from_stage {
     )+};
 }
 
+impl From<MakeError> for DesignError {
+    fn from(e: MakeError) -> Self {
+        match e {
+            MakeError::Body(e) => e.into(),
+            MakeError::Piece(e) => e.into(),
+        }
+    }
+}
+
 from_stage! {
     StrengthError => Strength,
     SegmentationError => Segmentation,
     BodyError => Body,
     ChoiceError => Choice,
     PieceError => Piece,
-}
-
-/// Describes the faults of a kit that fails these checks, each once.
-fn plainly(checks: &[String]) -> String {
-    let mut words: Vec<&str> = Vec::new();
-    for check in checks {
-        let word = match check.as_str() {
-            "pieces sit within their play" => "a piece would rattle",
-            "every piece but the key is blocked"
-            | "no cluster but the key slides (translations)"
-            | "nothing but the key moves (6 dof)"
-            | "no piece can be worked out by hand" => "pieces would come loose",
-            "outer surface kept" => "some of the outer surface would be lost",
-            "every installation path is free" => "a piece would rub on its way in",
-            "assembled pieces do not overlap" => "pieces would overlap",
-            other => other,
-        };
-        if !words.contains(&word) {
-            words.push(word);
-        }
-    }
-    words.join(", ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::plainly;
-
-    #[test]
-    fn checks_that_mean_the_same_are_told_once() {
-        let failed = [
-            "every piece but the key is blocked",
-            "nothing but the key moves (6 dof)",
-            "a new one",
-        ];
-        let failed: Vec<String> = failed.map(String::from).into();
-        assert_eq!(plainly(&failed), "pieces would come loose, a new one");
-    }
 }

@@ -9,9 +9,9 @@ use super::candidate;
 use super::trial::{Parts, Trial};
 use super::wall::Wall;
 use super::ways::{self, Input};
-use super::{DesignError, Handover, KeySource, Params, explore, resolve_params};
+use super::{DesignError, KeySource, Params, explore, resolve_params};
 use crate::key::{self, KeyParams, KeySite};
-use crate::plan::{Blocker, PlanOutcome, search};
+use crate::plan::{Blocker, Handover, PlanOutcome, search};
 use crate::{Ctx, InstallationPlan, SegmentedSurface, Warning, segmentation};
 
 /// First division of a model and its prospects, in the space of the model as it was given.
@@ -154,13 +154,9 @@ fn judge(ctx: &Ctx, parts: Parts<'_, '_>, _: &Allowance) -> Result<Found<Verdict
         }
         PlanOutcome::Infeasible { reason, blockers, .. } => {
             let back = turn.inverse();
-            let blocker = |b: Blocker| Blocker {
-                at: back.apply(Vec3::from(b.at)).to_array(),
-                ..b
-            };
             Verdict::Blocked {
                 reason,
-                blockers: blockers.into_iter().map(blocker).collect(),
+                blockers: blockers.into_iter().map(|b| b.rotate(&back)).collect(),
                 surface: SegmentedSurface {
                     mesh: back.mesh(&surface.mesh),
                     ..surface.clone()

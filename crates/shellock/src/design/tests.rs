@@ -9,8 +9,7 @@ use kits::*;
 use shellock_geom::{Solid, Vec3};
 
 use super::attempt::Failure;
-use super::handover::Handover;
-use super::lesson::{Lesson, lessons};
+use super::lesson::lessons;
 use super::trial::Job;
 use super::*;
 use crate::Progress;
@@ -19,7 +18,8 @@ use crate::connector::SeamRoom;
 use crate::key::{KeyPrism, KeySite, Turn};
 use crate::metric::ChoiceError;
 use crate::piece::PieceError;
-use crate::plan::PlanConstraints;
+use crate::plan::lesson::Lesson;
+use crate::plan::{Handover, PlanConstraints};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
 use crate::verify::Finding;
@@ -348,7 +348,7 @@ fn without_any_plan_the_answer_is_the_failure_with_a_piece_as_the_key() {
     best.fail(Failure::of("a later way failed as well"));
     best.close_key(&ctx, None);
     let agenda = Agenda::new(&ctx, &ball.input());
-    let Ok(DesignOutcome::NoPlan { reason, .. }) =
+    let Ok(DesignOutcome::NoPlan(NoPlan { reason, .. })) =
         best.conclude(&ctx, &ball.input(), &agenda, Effort::default())
     else {
         panic!("no kit was made")
@@ -397,7 +397,7 @@ fn work_that_leads_to_no_plan_or_to_an_error_counts() {
         ..Effort::default()
     };
     let (outcome, effort) = halves(&Ctx::quiet(), &at_once());
-    assert!(matches!(outcome, Ok(DesignOutcome::NoPlan { .. })));
+    assert!(matches!(outcome, Ok(DesignOutcome::NoPlan(_))));
     assert_eq!(effort, in_vain);
     let too_fine = Params {
         cell_mm: Some(1e-4),
@@ -416,9 +416,9 @@ fn pieces_that_are_not_divided_again_for_want_of_time_are_reported() {
         let mut params = at_once();
         params.rounds.refinements = refinements;
         match halves(ctx, &params).0 {
-            Ok(DesignOutcome::NoPlan {
+            Ok(DesignOutcome::NoPlan(NoPlan {
                 is_cut_short, reason, ..
-            }) => {
+            })) => {
                 assert_eq!(reason.contains("the time was over"), is_cut_short, "{reason}");
                 is_cut_short
             }

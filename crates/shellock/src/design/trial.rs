@@ -9,16 +9,17 @@ use super::agenda::{Agenda, CUT_KEYS, Effort, Step};
 use super::attempt::Failure;
 use super::candidate::{self, Candidate};
 use super::cost::Cost;
-use super::division::{Division, WallGrid};
-use super::lesson::Lesson;
+use super::division::Division;
 use super::wall::{Thicker, Wall};
 use super::ways::{Input, Walls, Way};
 use super::{DesignError, KeySource, Settings};
-use crate::key::KeySite;
+use crate::body::WallGrid;
+use crate::key::{FaceSet, KeySite};
+use crate::plan::lesson::Lesson;
 use crate::plan::{self, PlanConstraints, PlanSurvey};
 use crate::sizes::ChosenSizes;
 use crate::strength::StressMap;
-use crate::{Ctx, IdVec, PatchId, SegmentedSurface, Warning, segmentation};
+use crate::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
 
 /// A change of a trial, with the data that it needs.
 pub(super) enum Change {
@@ -49,7 +50,7 @@ pub(super) struct Job<'a> {
     pub surface: SegmentedSurface,
     stress: Option<StressMap>,
     /// Triangles of the model that the user wants in the key; `None` if the key is ours to choose.
-    key_faces: Option<Vec<bool>>,
+    key_faces: Option<FaceSet>,
 }
 
 impl<'a> Job<'a> {
@@ -72,17 +73,9 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// The patch with the largest share of the triangles that the user wants in the key.
+    /// The patch with the largest share of what the user wants in the key.
     pub fn key_of(&self, surface: &SegmentedSurface) -> Option<PatchId> {
-        let is_key = self.key_faces.as_ref()?;
-        let mut area_mm2: IdVec<PatchId, f64> = IdVec::from_fn(surface.n_patches, |_| 0.0);
-        for (face, &patch) in surface.patch_of_face.iter().enumerate() {
-            if is_key[surface.source_face[face] as usize] {
-                area_mm2[patch] += surface.mesh.face_area(face);
-            }
-        }
-        let largest = area_mm2.iter().max_by(|a, b| a.1.total_cmp(b.1));
-        largest.map(|(patch, _)| patch)
+        self.key_faces.as_ref()?.main_patch(surface)
     }
 
     pub fn settings(&self) -> &Settings {
@@ -96,24 +89,18 @@ impl<'a> Job<'a> {
 }
 
 /// Triangles of the model that are to be in the key, as [`KeySource::Piece`] says.
-fn key_faces(input: &Input<'_>, surface: &SegmentedSurface) -> Result<Option<Vec<bool>>, DesignError> {
+fn key_faces(input: &Input<'_>, surface: &SegmentedSurface) -> Result<Option<FaceSet>, DesignError> {
     let KeySource::Piece(name) = input.params.key else {
         return Ok(None);
     };
-    let mut is_key = vec![false; input.model.mesh().triangles.len()];
-    if let Some(labels) = input.labels {
-        for (is_key, label) in is_key.iter_mut().zip(labels) {
-            *is_key = *label == name;
-        }
-    } else {
-        for (patch, &source) in surface.patch_of_face.iter().zip(&surface.source_face) {
-            is_key[source as usize] |= i64::from(patch.number()) == name;
-        }
-    }
-    match (is_key.contains(&true), input.labels) {
-        (true, _) => Ok(Some(is_key)),
-        (false, Some(_)) => Err(DesignError::NoLabelOfKey(name)),
-        (false, None) => Err(DesignError::NoPieceOfKey(name, surface.n_patches)),
+    let faces = match input.labels {
+        Some(labels) => FaceSet::with_label(labels, name),
+        None => FaceSet::of_piece(surface, input.model.mesh().triangles.len(), name),
+    };
+    match (faces.is_empty(), input.labels) {
+        (false, _) => Ok(Some(faces)),
+        (true, Some(_)) => Err(DesignError::NoLabelOfKey(name)),
+        (true, None) => Err(DesignError::NoPieceOfKey(name, surface.n_patches)),
     }
 }
 
@@ -289,7 +276,7 @@ impl<'a> Trial<'a> {
         self.setup = None;
         let site = self.site(agenda);
         if let Some(site) = &site {
-            ctx.note(&candidate::words(site));
+            ctx.note(&site.words());
         }
         let job = self
             .job

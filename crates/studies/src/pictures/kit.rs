@@ -79,7 +79,7 @@ impl Kit {
         let design = match outcome {
             DesignOutcome::Made(design) if design.kit.verification.has_passed() => *design,
             DesignOutcome::Made(_) => return Err(fault("its kit fails a check".into())),
-            DesignOutcome::NoPlan { reason, .. } => return Err(fault(reason)),
+            DesignOutcome::NoPlan(none) => return Err(fault(none.reason)),
         };
         let settings = Settings::with_thickness(params, design.kit.thickness_mm);
         let meshes: Vec<TriMesh> = design.kit.pieces.as_slice().to_vec();

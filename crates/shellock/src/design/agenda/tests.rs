@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use super::*;
-use crate::design::params::Rounds;
+use crate::design::Rounds;
 use crate::segmentation::Method;
 
 const N_PIECES: usize = 8;

@@ -4,11 +4,10 @@ use shellock_geom::{TriMesh, Vec3};
 
 use crate::causes::Make;
 use crate::design::Kit;
-use crate::design::handover::Handover;
 use crate::key::Turn;
 use crate::metric::Holding;
 use crate::plan::key::KeyDirections;
-use crate::plan::{LatticePlan, PlanProof, ProofScope};
+use crate::plan::{Handover, LatticePlan, PlanProof, ProofScope};
 use crate::play::{KitPlay, Rattle, Slide};
 use crate::verify::{Check, Finding, Play, Verification};
 use crate::{ConnectorSizes, IdVec, LatticeDirection, PatchId, Warning};

@@ -1,16 +1,15 @@
 //! Parameters that a user may set.
 
+use shellock_divide::segmentation::{KeepWhole, Method};
+use shellock_make::connector::ConnectorParams;
+use shellock_make::piece::LabelParams;
 use shellock_mechanics::Material;
 
-use crate::connector::ConnectorParams;
-use crate::piece::LabelParams;
-use crate::segmentation::{KeepWhole, Method};
-
-/// Parameters that a user may set, each once. [`Settings`](super::Settings) derives the parameters of
+/// Parameters that a user may set, each once. [`Settings`](crate::Settings) derives the parameters of
 /// each stage from them.
 ///
 /// ```
-/// let mut params = shellock::Params::default();
+/// let mut params = shellock_settings::Params::default();
 /// params.n_pieces = Some(8);
 /// assert!(params.problems().is_empty());
 /// ```
@@ -92,7 +91,7 @@ impl Default for Params {
 impl Params {
     /// Lists every problem of every stage, in words. Empty if the parameters are valid.
     pub fn problems(&self) -> Vec<String> {
-        super::settings::problems(self)
+        crate::stages::problems(self)
     }
 }
 
@@ -114,7 +113,7 @@ impl Default for Thickness {
 /// Choice of the key, the piece installed last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
-    /// Cut out of the surface where it slides best, see [`crate::key`]. If no such kit passes, the key is
+    /// Cut out of the surface where it slides best, see [`shellock_divide::key`]. If no such kit passes, the key is
     /// chosen as with `Flattest`.
     #[default]
     Cut,

@@ -1,19 +1,21 @@
 //! Parameters of each stage, resolved once from the user's parameters and the wall thickness.
 
-use super::{Params, Thickness};
-use crate::body::BodyParams;
-use crate::connector::ConnectorParams;
-use crate::piece::Relief;
-use crate::plan::PlanParams;
-use crate::play::{self, PlayParams};
-use crate::segmentation::SegmentationParams;
-use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams};
-use crate::strength::StrengthParams;
-use crate::verify::VerifyParams;
-use crate::{LatticeDirection, PatchId};
+use shellock_assembly::LatticeDirection;
+use shellock_assembly::play::{self, PlayParams};
+use shellock_assembly::verify::VerifyParams;
+use shellock_divide::segmentation::SegmentationParams;
+use shellock_make::body::BodyParams;
+use shellock_make::connector::ConnectorParams;
+use shellock_make::piece::Relief;
+use shellock_plan::PlanParams;
+use shellock_plan::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams};
+use shellock_rate::strength::StrengthParams;
+use shellock_report::PatchId;
+
+use crate::params::{Params, Thickness};
 
 /// Parameters of each stage. The stages do not change them. A kit whose key is cut overrides some of them,
-/// see `with_key`.
+/// see [`with_key`](Self::with_key).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
@@ -97,7 +99,7 @@ impl Settings {
     }
 
     /// Returns these settings for pieces of which `key` was cut so that it leaves along `slide` alone.
-    pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
+    pub fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
         let key_gap_mm = self.body.seam_gap_mm.max(0.5 * self.connector.key_clearance_mm);
         Self {
             plan: PlanParams {
@@ -115,7 +117,7 @@ impl Settings {
 
     /// Returns the least gaps that finished pieces must keep: those of connectors or of walls, whichever are
     /// narrower.
-    pub(super) fn relief(&self) -> Relief {
+    pub fn relief(&self) -> Relief {
         let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.seam_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
         Relief {
@@ -126,7 +128,7 @@ impl Settings {
 }
 
 /// Lists every problem of every stage, in words. Values derived from others are not reported twice.
-pub(super) fn problems(params: &Params) -> Vec<String> {
+pub(crate) fn problems(params: &Params) -> Vec<String> {
     let settings = Settings::resolve(params);
     let label = params.label.map_or_else(Vec::new, |l| l.problems());
     let stages = [

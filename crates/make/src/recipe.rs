@@ -1,0 +1,190 @@
+//! Pieces of a plan, in one call.
+
+use std::collections::BTreeMap;
+
+use shellock_assembly::{InstallationPlan, LatticeDirection, PressFitKind};
+use shellock_geom::Aabb;
+use shellock_plan::LatticePlan;
+use shellock_plan::sizes::{CONTACT_SIZES, ConnectorSizes};
+use shellock_report::{Ctx, IdVec, PatchId, Warning};
+use shellock_surface::SegmentedSurface;
+use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
+
+use crate::body::{self, BodyError, BodyParams, PatchDistances, ShellBodies, ShellGrid};
+use crate::causes::Cause;
+use crate::connector::{self, Run, SeamRoom, is_unobstructed};
+use crate::piece::{self, FinishParams, Finished, FinishedJoint, PieceError};
+
+/// Inputs of the pieces of a plan.
+pub struct Recipe<'a> {
+    /// Parameters of the wall and its split into shell bodies.
+    pub body: &'a BodyParams,
+    /// Parameters of connectors and of the finish.
+    pub finish: FinishParams<'a>,
+    /// Surface divided into the pieces.
+    pub surface: &'a SegmentedSurface,
+    /// Connector size of each pair of pieces.
+    pub sizes: &'a ConnectorSizes,
+    /// Grid of the wall, with room for the largest connectors.
+    pub grid: &'a ShellGrid,
+    /// Distances of the grid's nodes to the pieces.
+    pub distances: &'a PatchDistances,
+    /// Order and directions of installation.
+    pub plan: &'a LatticePlan,
+    /// Direction in which a cut key slides; `None` if the key is one of the pieces.
+    pub key_slide: Option<LatticeDirection>,
+}
+
+/// Reason why the pieces of a plan cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum MakeError {
+    /// The wall cannot be split.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A piece cannot be finished.
+    #[error(transparent)]
+    Piece(#[from] PieceError),
+}
+
+/// Makes the pieces of a plan: the wall, split along it; connectors under the seams; finished meshes. Also
+/// returns the room for connectors on each seam.
+///
+/// Warns of parts that a piece lost, of a key without ribs, a notch or a number, of places that press on
+/// purpose, and of seams without a connector.
+pub fn make(ctx: &Ctx, recipe: &Recipe<'_>) -> Result<(Finished, Vec<SeamRoom>), MakeError> {
+    let Recipe {
+        body,
+        finish,
+        surface,
+        sizes,
+        grid,
+        distances,
+        plan,
+        ..
+    } = recipe;
+    let rooms = rooms(body, finish, surface, sizes);
+    let shell = body::build(ctx, body, grid, distances, plan, &rooms)?;
+    let (runs, contacts) = connectors(recipe, &shell);
+    let finished = piece::make(ctx, finish, grid, &shell, plan, &runs, &rooms)?;
+    warn_of_press_fits(ctx, &finished);
+    warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
+    Ok((finished, contacts))
+}
+
+/// Places connectors along the seams. Returns their runs, and the room that each seam has for them.
+fn connectors(recipe: &Recipe<'_>, shell: &ShellBodies) -> (Vec<Run>, Vec<SeamRoom>) {
+    let Recipe {
+        grid, plan, sizes, ..
+    } = recipe;
+    let params = recipe.finish.connector;
+    let curves = shell
+        .inner
+        .as_ref()
+        .map_or(Vec::new(), |inner| connector::curves(grid, inner, plan));
+    let is_free = is_unobstructed(params, grid, shell);
+    let runs_for = |slide| connector::runs(params, sizes, plan, &curves, slide, &is_free);
+    match recipe.key_slide {
+        Some(cut) => runs_for(Some(cut.unit())),
+        // If one of the pieces is the key, it gets rails only if its seams happen to allow them.
+        None => {
+            let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
+            if own.0.iter().any(Run::is_rail) {
+                own
+            } else {
+                runs_for(None)
+            }
+        }
+    }
+}
+
+/// Warns of detents that the key must be pressed past, and of ribs that hold a key without rails.
+fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
+    let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
+    for d in of(PressFitKind::Detent) {
+        ctx.warn(Warning::new(
+            Cause::Detent {
+                interference_mm: d.interference_mm,
+                travel_mm: d.travel_mm,
+            },
+            vec![d.piece],
+            Some(d.at),
+        ));
+    }
+    if let Some(rib) = of(PressFitKind::Rib).next() {
+        ctx.warn(Warning::new(
+            Cause::KeyRibs {
+                n: of(PressFitKind::Rib).count(),
+                interference_mm: rib.interference_mm,
+                travel_mm: rib.travel_mm,
+            },
+            vec![rib.piece],
+            Some(rib.at),
+        ));
+    }
+}
+
+/// Warns of seams that have the length for a connector, but came out without one.
+fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], joints: &[FinishedJoint]) {
+    let has_room = |c: &&SeamRoom| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
+    for contact in contacts.iter().filter(has_room) {
+        let pair = [contact.later, contact.earlier];
+        let joins = |j: &&FinishedJoint| pair.contains(&j.male) && pair.contains(&j.female);
+        if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
+            ctx.warn(Warning::new(
+                Cause::SeamWithoutConnector {
+                    length_mm: contact.length_mm,
+                },
+                pair.to_vec(),
+                Some(contact.at.to_array()),
+            ));
+        }
+    }
+}
+
+/// Returns a box around each patch and all connectors that its piece can have.
+fn rooms(
+    body: &BodyParams,
+    finish: &FinishParams<'_>,
+    surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
+) -> IdVec<PatchId, Aabb> {
+    /// Upper bound of the shift of seams by carving, mm.
+    const SHIFT_MM: f64 = 2.0;
+    let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
+    for (face, &p) in surface.patch_of_face.iter().enumerate() {
+        rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
+    }
+    let reach = body.thickness_mm + finish.connector.room_mm(sizes.largest_mm()) + SHIFT_MM;
+    rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
+}
+
+/// Pieces of a pair, the later one first, with the lengths of their connectors and of their seam, mm.
+pub type SeamLengths = ((PatchId, PatchId), [f64; 2]);
+
+/// Finds pairs of pieces whose connectors came out too short to hold them together. Pieces of seams and joints
+/// are those of `plan`.
+pub fn short_connectors<D: Copy>(
+    plan: &InstallationPlan<D>,
+    sizes: &ConnectorSizes,
+    contacts: &[SeamRoom],
+    joints: &[FinishedJoint],
+) -> Vec<SeamLengths> {
+    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
+    let by_order = |a: PatchId, b: PatchId| match plan.position(a) > plan.position(b) {
+        true => (a, b),
+        false => (b, a),
+    };
+    for contact in contacts {
+        let pair = by_order(contact.later, contact.earlier);
+        lengths.entry(pair).or_default()[1] += contact.length_mm;
+    }
+    for joint in joints {
+        let pair = by_order(joint.male, joint.female);
+        lengths.entry(pair).or_default()[0] += joint.length_mm;
+    }
+    let is_short = |(a, b), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * sizes.of(a, b);
+    lengths
+        .into_iter()
+        .filter(|(pair, [length_mm, _])| is_short(*pair, *length_mm))
+        .collect()
+}
