@@ -115,7 +115,7 @@ def steps(lines):
     """Number and words of each step."""
     lines = list(lines)
     for number, words in zip(lines, lines[1:]):
-        if number.isdigit() and (words == "begin with this piece" or re.match(r"(the key, )?from ", words)):
+        if number.isdigit() and (words == "start with this piece" or re.match(r"(the key, )?from ", words)):
             yield int(number), words
 
 

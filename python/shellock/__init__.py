@@ -282,7 +282,7 @@ def _plain(name: str, value: Any) -> Any:
         parts = [_plain(name, v) for v in value]
         is_one = isinstance(value, tuple) and parts and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in parts)
         return ",".join(map(str, parts)) if is_one else parts
-    raise InputError(f"{name}: this cannot be a value of it: {value!r}", 2)
+    raise InputError(f"{name}: this is not a valid value: {value!r}", 2)
 
 
 def _refuse_options(options: str) -> None:

@@ -247,7 +247,7 @@ def _checked(options: Mapping[str, Any], cpus: int, patience: float) -> Dict[str
 def _jobs(folder: str, out: Optional[str]) -> List[Tuple[Path, Path]]:
     jobs = shellock._asked(_native.models, folder, out)
     if not jobs:
-        raise shellock.InputError(f"{folder} holds no model", 2)
+        raise shellock.InputError(f"{folder} contains no model", 2)
     return jobs
 
 

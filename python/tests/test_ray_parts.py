@@ -108,7 +108,7 @@ def test_options_given_several_times_are_a_list_and_flags_are_booleans():
 
 
 @pytest.mark.parametrize("words, says", [
-    (["nofolder"], "nofolder"), (["."], "holds no model"), ([".", "--option", "sise=3"], 'no option "sise"'), ([".", "--option", "size=big"], "--size"),
+    (["nofolder"], "nofolder"), (["."], "contains no model"), ([".", "--option", "sise=3"], 'no option "sise"'), ([".", "--option", "size=big"], "--size"),
     ([".", "--cpus", "0"], "1 or more"), ([".", "--patience", "0"], "more than 0"),
 ])
 def test_what_is_wrong_is_said_in_a_line(words, says, tmp_path):

@@ -273,7 +273,7 @@ def test_values_of_options_may_be_of_numpy_and_are_else_refused_by_name():
     assert plain(key=(1, 2, 3.5)) == {"key": "1,2,3.5"} and plain(key=np.array([1, 2, 3])) == {"key": "1,2,3"}
     assert plain(keep_whole=[(0, 0, 9, 5), 3]) == {"keep-whole": ["0,0,9,5", 3]}
     for value in (Path("a"), Decimal(3), b"60", float("nan"), np.float64("inf"), {"a": 1}, np.array("2020", "M8")):
-        with pytest.raises(shellock.InputError, match="size: this cannot be"):
+        with pytest.raises(shellock.InputError, match="size: this is not"):
             shellock.build(b"solid nothing\n", name="a.stl", size=value)
 
 

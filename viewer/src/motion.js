@@ -105,7 +105,7 @@ export class Player {
     if (!this.motion) return "";
     const notes = [];
     if (this.stepped >= 0) notes.push(`pose ${this.stepped + 1} of ${poseCount(this.motion)}`);
-    if (this.scale !== 1) notes.push(`shown ${this.scale} times as large`);
+    if (this.scale !== 1) notes.push(`shown ${this.scale} times larger`);
     return notes.length ? `${this.motion.title} (${notes.join(", ")})` : this.motion.title;
   }
 }

@@ -42,7 +42,7 @@ export function buildPanel(header, meshes, order, on) {
   const motions = motionControls(header, on);
   const sway = swayControls(on);
   const loads = loadList(header, on);
-  const turn = button("Turn", "Turn the model on and on", on.turn);
+  const turn = button("Rotate", "Rotate the model continuously", on.turn);
   const view = element("div", "modes");
   view.append(turn, button("Reset", "Reset the view", on.home));
   tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, ...motions.holders, sway.holder, view);
@@ -140,9 +140,9 @@ function part(of) {
 // How far meshes move within their gaps, in words and figures.
 function playTab(header) {
   const played = (header.quantities ?? []).filter((q) => /play/.test(q.name) && q.values.some((v) => v !== null));
-  const rows = played.map((q) => [`most ${q.name}`, `${Math.max(...q.values.filter((v) => v !== null)).toFixed(1)} ${q.unit}`]);
+  const rows = played.map((q) => [`largest ${q.name}`, `${Math.max(...q.values.filter((v) => v !== null)).toFixed(1)} ${q.unit}`]);
   if (!rows.length && !(header.motions ?? []).length) return [];
-  const words = "Pieces have gaps so that they go together, so each can be wiggled a little while the others rest. \"shake\" below the model shows how far.";
+  const words = "Pieces need gaps to go together, so each one has a little play. Press \"shake\" below the model to see how far each piece moves while the others stay still.";
   return [section("Play", element("p", "line", words), table(rows))];
 }
 
@@ -165,7 +165,7 @@ function summary({ checks, notes }) {
   const line = element("p", "summary");
   const failed = checks.filter((c) => !c.ok).length;
   if (checks.length) {
-    line.append(element("span", failed ? "pill bad" : "pill good", failed ? `${failed} of ${checks.length} checks FAIL` : `${checks.length} checks ok`));
+    line.append(element("span", failed ? "pill bad" : "pill good", failed ? `${failed} of ${checks.length} checks FAIL` : `${checks.length} checks passed`));
   }
   for (const [severity, look] of [["problem", "bad"], ["warning", "warn"], ["note", "plain"]]) {
     const n = notes.filter((note) => (note.severity ?? "warning") === severity).length;
@@ -222,7 +222,7 @@ function stepControls(count, on) {
   const playing = button("▶", "Play", on.play);
   const text = element("span", "count");
   const time = slider("", count, on.scrub);
-  Object.assign(time.input, { max: count, step: 0.02, title: "Any moment of the assembly" });
+  Object.assign(time.input, { max: count, step: 0.02, title: "Position in the assembly" });
   time.input.setAttribute("aria-label", time.input.title);
   holder.append(button("|◀", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), time.holder, text);
   return {
@@ -279,7 +279,7 @@ function paintControls(header, on) {
       const text = (value) => (unit ? value.toFixed(2) : String(value));
       low.textContent = text(shades.low);
       high.textContent = `${text(shades.high)} ${unit}`;
-      none.textContent = shades.hasGaps ? "grey: none" : "";
+      none.textContent = shades.hasGaps ? "grey: no value" : "";
     },
   };
 }
@@ -288,7 +288,7 @@ function paintControls(header, on) {
 function motionControls(header, on) {
   const motions = header.motions ?? [];
   const buttons = motions.map(({ name, title }, i) => button(name, title, () => on.motion(i)));
-  const large = button("×5", "Show moves five times as large as they are", on.magnify);
+  const large = button("×5", "Show the motion five times larger", on.magnify);
   const plays = element("div", "plays");
   plays.append(...buttons);
   const holder = element("div", "modes motions");
@@ -307,7 +307,7 @@ function swayControls(on) {
   const holder = element("div", "steps sway");
   const playing = button("❚❚", "Play or pause", on.pause);
   const amount = slider("Load", 0, on.amount);
-  amount.input.title = "How much of the load shows";
+  amount.input.title = "Share of the load shown";
   amount.input.setAttribute("aria-label", amount.input.title);
   holder.append(playing, amount.holder);
   return {
@@ -337,7 +337,7 @@ function loadList(header, on) {
   const first = weakest && button("", "Show the place", on.weakest);
   if (first) {
     first.className = "weakest";
-    first.append(element("strong", "", "Gives way first"), element("span", "", weakest.text));
+    first.append(element("strong", "", "Fails first"), element("span", "", weakest.text));
     parts.push(first);
   }
   if (note) parts.push(element("p", "remark", note));

@@ -169,7 +169,7 @@ export class Swayer {
   caption() {
     if (!this.load) return "";
     const { title, scale } = this.load;
-    const times = scale >= 1 ? `${scale} times exaggerated` : `shown ${scale} times as large as it is`;
+    const times = scale >= 1 ? `exaggerated ${scale} times` : `shown at ${scale} times its real size`;
     return scale === 1 ? title : `${title} (${times})`;
   }
 }

@@ -25,7 +25,7 @@ function start() {
   try {
     stage = new Stage(holder, meshes, carriers);
   } catch (error) {
-    holder.append(element("p", "failure", `This browser cannot show 3D (${error.message}). The lists beside still hold.`));
+    holder.append(element("p", "failure", `This browser cannot show 3D (${error.message}). The lists in the panel still work.`));
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
@@ -93,7 +93,7 @@ function start() {
   function stepCaption(i) {
     if (i === undefined) return "";
     const { name, step, badge } = meshes[i];
-    const what = step === 0 ? `Begin with ${name}` : `Put ${name} in along the arrow${badge ? `: it is the ${badge} and locks all` : ""}`;
+    const what = step === 0 ? `Start with ${name}` : `Slide ${name} in along the arrow${badge ? `: it is the ${badge} and locks all pieces` : ""}`;
     const turn = state.isTurned ? (state.below ? " – turn it over: seen from below" : " – turn it back: seen from above") : state.below ? " – seen from below" : "";
     return `Step ${step + 1} of ${meshes.length}: ${what}${turn}`;
   }
@@ -295,8 +295,8 @@ function start() {
 
   function measureCaption() {
     const [a, b] = state.measured;
-    if (b) return `${a.distanceTo(b).toFixed(1)} mm between the two places`;
-    return a ? "Click a second place" : "Click two places to measure between them";
+    if (b) return `${a.distanceTo(b).toFixed(1)} mm between the two points`;
+    return a ? "Click a second point" : "Click two points to measure the distance between them";
   }
 
   const isShown = (i) => !state.hidden.has(i) && !(state.alone && state.chosen !== i) && (state.mode !== "steps" || order.indexOf(i) < Math.ceil(state.step));

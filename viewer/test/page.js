@@ -208,7 +208,7 @@ function sampleLoads(meshes, add) {
   const load = { name: "pressed <b>", figure: "70 N", title: "Pressed <b>", arrows: [{ name: "70 N", tip: [6, 0, 10], along: [0, 0, -1] }], floor: [[0, 0, 0], [0, 0, 1]], place, scale: 4, step_mm: 0.001, moved: moved(-500) };
   const nothing = { name: "held", figure: "more than 9 N", title: "Nothing gives way", arrows: [], floor: null, place: null, scale: 1, step_mm: 0, moved: moved(0) };
   const carriers = meshes.map(({ carrier }) => carrier);
-  return { title: "What it bears", note: "By simulation.", carriers, loads: [load, nothing], weakest: { text: "pressed: it opens", place } };
+  return { title: "Loads it can take", note: "By simulation.", carriers, loads: [load, nothing], weakest: { text: "pressed: it opens", place } };
 }
 
 export async function samplePage({ motions, hasLoads = false, script = CLICKS } = {}) {
@@ -237,7 +237,7 @@ export async function samplePage({ motions, hasLoads = false, script = CLICKS } 
     notes: [{ severity: "problem", title: "corner", text: "look here", at: [11, 5, 10] }, { title: "general", text: "no place", at: null }],
     quantities: [{ name: "size <i>", unit: "mm", values: [10, null] }, { name: "nothing", unit: "", values: [null, null] }],
     motions,
-    tabs: [{ name: "Print <b>", parts: [{ table: ["What it takes", [["plates", "2"]]] }, { text: ["In the slicer", ["one", "two"]] }, { files: ["Files", [["a b.3mf", "all"]]] }] }],
+    tabs: [{ name: "Print <b>", parts: [{ table: ["Plates, time and material", [["plates", "2"]]] }, { text: ["Slicer settings", ["one", "two"]] }, { files: ["Files", [["a b.3mf", "all"]]] }] }],
     loads: hasLoads ? sampleLoads(meshes, add) : undefined,
   };
   const dist = (name) => readFile(new URL(`../../crates/render/viewer/${name}`, import.meta.url), "utf8");

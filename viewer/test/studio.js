@@ -158,7 +158,7 @@ async function paint(page, name) {
   const told = await page.$$eval(".advice", (all) => all.map((e) => e.textContent).join(" "));
   assert.match(told, /island|joined|apart|piece/i, `${name}: what is wrong is told: ${told}`);
   await shot(page, `${name}-6-island`);
-  if (await page.$(".mend")) { await press(page, "Mend"); await settled(page); await rest(300); await settled(page); }
+  if (await page.$(".mend")) { await press(page, "Fix"); await settled(page); await rest(300); await settled(page); }
   const judged = await page.evaluate(() => window.studio.state.judged);
   assert.ok(judged.locks, `${name}: mended, it locks: ${judged.words}`);
   console.log(`      ${name}: a verdict ${verdict} ms after the stroke`);

@@ -127,7 +127,7 @@ test("a motion plays, shows five times as large, and is put back", { skip: witho
   assert.ok(way.faint[0] < 0.6 && way.faint[1] === 1, "what moves is seen through what stays");
   assert.ok(isClose(m.end.matrix, posed(OUT.moves[0].poses[2], 1)));
   assert.ok(isClose(m.large.matrix, posed(OUT.moves[0].poses[2], 5)));
-  assert.deepEqual([m.large.pressed, m.large.caption], [["true", "false", "true"], `${OUT.title} (shown 5 times as large)`]);
+  assert.deepEqual([m.large.pressed, m.large.caption], [["true", "false", "true"], `${OUT.title} (shown 5 times larger)`]);
   for (const back of [m.back, m.escaped]) {
     assert.ok(isClose(back.matrix, ASSEMBLED));
     assert.deepEqual([back.pressed, back.caption, back.faint], [["false", "false", "false"], "", [1, 1]]);
@@ -179,7 +179,7 @@ test("choosing a load moves points, tells the factor and shows where it acts", {
   const down = (mm) => [rest[0], [rest[1][0], rest[1][1], rest[1][2] - mm]];
   assert.deepEqual([m.before.hasSlider, m.before.signs, m.before.labels], [false, [], []]);
   assert.ok(near(m.full.points, down(2)), `0.5 mm, four times: ${m.full.points}`);
-  assert.equal(m.full.caption, "Pressed <b> (4 times exaggerated)");
+  assert.equal(m.full.caption, "Pressed <b> (exaggerated 4 times)");
   assert.deepEqual(m.full.signs, ["Arrow", "CircleGeometry", "TubeGeometry", "TubeGeometry"]);
   assert.deepEqual([m.full.pressed, m.full.labels, m.full.hasSlider, m.full.isPlaying], [["true", "false", "false"], ["opens here <b>", "70 N"], true, true]);
   assert.ok(near(m["back at rest"].points, rest));
@@ -191,7 +191,7 @@ test("choosing a load moves points, tells the factor and shows where it acts", {
     assert.ok(near(back.points, rest));
     assert.deepEqual([back.signs, back.labels, back.hasSlider, back.pressed], [[], [], false, ["false", "false", "false"]]);
   }
-  assert.deepEqual([m.escaped.caption, m.steps.caption], ["", "Step 1 of 2: Begin with mesh 0 <b>"]);
+  assert.deepEqual([m.escaped.caption, m.steps.caption], ["", "Step 1 of 2: Start with mesh 0 <b>"]);
   assert.deepEqual([m.weakest.signs, m.weakest.labels, m.weakest.pressed], [["TubeGeometry", "TubeGeometry"], ["opens here <b>"], ["false", "false", "true"]]);
   assert.ok(!dom.includes("<b>"), "text stays text");
 });
@@ -202,7 +202,7 @@ test("who wants no animation sees a load at its full, still, and has the slider"
   const [still, [x, y, z]] = m.before.points;
   const full = [still, [x, y, z - 2]];
   assert.ok(near(m.full.points, full) && near(m["back at rest"].points, full), "nothing moves by itself");
-  assert.deepEqual([m.full.isPlaying, m.full.amount, m.full.caption], [false, 1, "Pressed <b> (4 times exaggerated)"]);
+  assert.deepEqual([m.full.isPlaying, m.full.amount, m.full.caption], [false, 1, "Pressed <b> (exaggerated 4 times)"]);
   assert.ok(near(m.half.points, [still, [x, y, z - 1]]));
 });
 
@@ -213,11 +213,11 @@ test("a step turns the camera to where it is seen, in grey what is there; number
   const close = (a, b) => a.every((x, k) => Math.abs(x - b[k]) < 0.02);
   const unit = (v) => v.map((x) => x / Math.hypot(...v));
   assert.ok(close(steps[0].look, unit([0, 1, -0.5])) && close(steps[1].look, unit([0, 1, 0.5])), JSON.stringify(steps));
-  assert.deepEqual(steps.map((s) => s.caption), ["Step 1 of 2: Begin with mesh 0 <b>", "Step 2 of 2: Put mesh 1 <b> in along the arrow: it is the last and locks all – turn it over: seen from below"]);
+  assert.deepEqual(steps.map((s) => s.caption), ["Step 1 of 2: Start with mesh 0 <b>", "Step 2 of 2: Slide mesh 1 <b> in along the arrow: it is the last and locks all pieces – turn it over: seen from below"]);
   const [red, green, blue] = steps[1].colors[0];
   assert.ok(Math.abs(red - green) < 0.02 && Math.abs(green - blue) < 0.03, "what is there is grey");
   assert.deepEqual(numbers, ["0 <b>", "1 <b>"]);
-  assert.match(measured, /^1[12]\.\d mm between the two places$/, "12 mm, as near as a pixel is");
+  assert.match(measured, /^1[12]\.\d mm between the two points$/, "12 mm, as near as a pixel is");
   assert.equal(hovered, "mesh hovered");
   assert.deepEqual(sheets, ["Meshes", "Print <b>", "Checks"]);
   assert.match(dom, /<a href="a%20b.3mf" download="">a b.3mf<\/a>/);

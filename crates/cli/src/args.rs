@@ -36,19 +36,19 @@ fn version() -> &'static str {
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
-    /// Print help with the options used most
+    /// Print help with the most used options
     #[arg(short, long, global = true, action = ArgAction::HelpShort)]
     pub help: Option<bool>,
-    /// Print help with every option, its range and what it is for
+    /// Print help with every option, its range and its purpose
     #[arg(long, global = true, action = ArgAction::HelpLong)]
     pub help_all: Option<bool>,
     /// Print JSON: the result, and progress on standard error
     #[arg(long, global = true)]
     pub json: bool,
-    /// Say nothing but what is wrong
+    /// Print nothing but problems
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Tell all: every check, note and figure of the plan
+    /// Print every check, note and figure of the plan
     #[arg(long, short, global = true, conflicts_with = "quiet")]
     pub verbose: bool,
     /// End as with Ctrl-C where standard input ends.
@@ -61,7 +61,7 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 pub enum Command {
-    /// Make the whole kit of a model: pieces, plan, 3MF, viewer page
+    /// Make a complete kit from a model: pieces, plan, 3MF, viewer page
     Build {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
@@ -70,7 +70,7 @@ pub enum Command {
         #[command(flatten)]
         out: Out,
     },
-    /// Make the kit of a figure that comes with the program
+    /// Make a kit of a figure that comes with the program
     Demo {
         /// Which figure: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         #[arg(long, default_value = "squirrel", value_name = "NAME")]
@@ -80,8 +80,8 @@ pub enum Command {
         #[command(flatten)]
         out: Out,
     },
-    /// Only divide the surface; write it with one label a triangle (.ply), painted for slicers (.3mf), or the
-    /// labels of the model's faces (.seg)
+    /// Only divide the surface; write it with one label per triangle (.ply), painted for slicers (.3mf), or
+    /// as labels of the model's faces (.seg)
     Segment {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
@@ -107,55 +107,55 @@ pub enum Command {
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,
     },
-    /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan
-    /// of half the score
+    /// Simulate a punch and a fall of a finished kit; compare it with connectors of half the size and with a
+    /// plan of half the score
     Test {
         /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds, 1: it does not
         kit: PathBuf,
         #[command(flatten)]
         blows: Blows,
     },
-    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it
-    /// is installed (that takes minutes)
+    /// Report what a finished kit saves over the solid model: material, and print time by PrusaSlicer if it
+    /// is installed (this takes minutes)
     Report {
         /// Folder of the kit; savings.json goes there
         kit: PathBuf,
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,
-        /// Use closed forms for the print time even where PrusaSlicer is installed
+        /// Use closed forms for the print time even if PrusaSlicer is installed
         #[arg(long)]
         closed_form: bool,
     },
     /// Make a small plate of pins, channels, keys and rails at five clearances, to find those that fit on
-    /// your printer; then keep them as a printer of your own
+    /// your printer; then save them as your own printer
     Coupon(CouponOptions),
-    /// Open a window in the browser, on this machine alone: choose, paint the pieces, place the key, make the
-    /// kit
+    /// Open the studio in the browser, on this machine only: open a model, paint the pieces, place the key,
+    /// make the kit
     Studio(StudioOptions),
-    /// Make kits of all models in a folder; what is made already stays, so that it can be stopped and go on
+    /// Make kits of all models in a folder; finished kits are kept, so that a stopped batch can continue
     Batch(Box<BatchOptions>),
-    /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
+    /// Print the completions of commands and options for a shell, for example `shellock completions bash`
     Completions {
         /// Shell that the completions are for
         shell: clap_complete::Shell,
     },
-    /// Write manual pages, one a command
+    /// Write manual pages, one per command
     Manual {
         /// Folder to write the pages to
         folder: PathBuf,
     },
-    /// Say what a file holds and whether it can be made
+    /// Report what a file contains and whether a kit can be made from it
     Inspect {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file
         model: PathBuf,
         #[command(flatten)]
         options: JobOptions,
-        /// Also divide the surface, by its labels or else by --method, and say where the seams run, who sees
-        /// them and how pieces hold each other
+        /// Also divide the surface, by its labels or else by --method, and report where the seams run, how
+        /// visible they are and how the pieces hold each other
         #[arg(long, help_heading = "Pieces")]
         segment: bool,
     },
-    /// Write one of the figures that come with the program
+    /// Write a figure that comes with the program
     Figure {
         /// Which: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         name: String,
@@ -176,10 +176,10 @@ pub enum Command {
 pub struct StudioOptions {
     /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface; it is copied into the project
     pub model: Option<PathBuf>,
-    /// Folder of the project: all that the studio writes is in it [default: the model's name with -studio]
+    /// Folder of the project, for everything that the studio writes [default: the model's name with -studio]
     #[arg(long, value_name = "DIR")]
     pub project: Option<PathBuf>,
-    /// Port on 127.0.0.1 [default: any that is free]
+    /// Port on 127.0.0.1 [default: any free port]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub port: u16,
     /// Only print the address
@@ -277,18 +277,18 @@ pub fn command() -> clap::Command {
 /// Which models, and how many at a time.
 #[derive(Args)]
 pub struct BatchOptions {
-    /// Folder of models; those in folders within it, too
+    /// Folder of models, with its subfolders
     pub folder: PathBuf,
-    /// Folder for the kits, one a model, with batch.html and batch.csv
+    /// Folder for the kits, one per model, with batch.html and batch.csv
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Kits at a time [default: one a core]
+    /// Kits made at the same time [default: one per core]
     #[arg(long, value_name = "N")]
     pub jobs: Option<usize>,
-    /// Memory for all kits at a time, GB [default: four fifths of what is free]
+    /// Memory for all kits made at the same time, GB [default: four fifths of the free memory]
     #[arg(long, value_name = "GB")]
     pub memory: Option<f64>,
-    /// A model that takes longer than this is stopped; seconds, or with a unit
+    /// Time limit for each model; seconds, or with a unit
     #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = units::seconds)]
     pub patience: f64,
     #[command(flatten)]
@@ -309,8 +309,8 @@ pub struct Out {
 /// Which fit test is made, or what came of it.
 #[derive(Args)]
 pub struct CouponOptions {
-    /// The printer whose clearances are the middle ones: sla, fdm, fdm-petg, sls, or one of the configuration
-    /// file
+    /// Printer whose clearances are in the middle of the range: sla, fdm, fdm-petg, sls, or one from the
+    /// configuration file
     #[arg(long, value_name = "NAME", default_value = "sla")]
     pub printer: String,
     /// Options and printers, in TOML; --save writes there [default: shellock.toml]
@@ -325,11 +325,11 @@ pub struct CouponOptions {
     /// Replace files of an earlier fit test
     #[arg(short, long, conflicts_with = "fits")]
     pub force: bool,
-    /// The number whose parts fit; --printer is the one that the plate was made for
+    /// Number whose parts fit; --printer names the printer that the plate was made for
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=N_FITS as i64),
           requires = "save")]
     pub fits: Option<u32>,
-    /// Keep the clearances of that number in the configuration file, as a printer of this name
+    /// Save the clearances of that number in the configuration file, as a printer of this name
     #[arg(long, value_name = "NAME", requires = "fits")]
     pub save: Option<String>,
 }

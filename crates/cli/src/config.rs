@@ -65,8 +65,8 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
         *own = printers;
     }
     if project.is_some() {
-        let model = model
-            .ok_or_else(|| refused("it names no model: write [model] with file and sha256".to_owned()))?;
+        let model =
+            model.ok_or_else(|| refused("it names no model: add [model] with file and sha256".to_owned()))?;
         let file = model.path(folder).map_err(refused)?;
         if let Some((path, options)) = model_of(&mut cli.command) {
             *path = file;
@@ -125,7 +125,7 @@ fn project_of(given: &ArgMatches) -> Result<Option<PathBuf>, Refusal> {
         .is_ok_and(|path| path.is_some());
     match model.filter(|path| given.try_contains_id("config").is_ok() && project::is_project(path)) {
         Some(path) if is_configured => Err(Refusal::File(format!(
-            "{} is a project with options of its own: leave out --config",
+            "{} is a project with its own options: leave out --config",
             path.display()
         ))),
         path => Ok(path.cloned()),

@@ -69,7 +69,7 @@ pub fn command_line() -> ExitCode {
             .num_threads(n.clamp(1, MOST_THREADS))
             .build_global()
     {
-        eprintln!("warning: --threads {n} was not taken: {e}");
+        eprintln!("warning: --threads {n} was ignored: {e}");
     }
     match run(&session, cli.command) {
         Ok(code) => ExitCode::from(code),

@@ -53,13 +53,13 @@ impl Finished<'_> {
             );
         } else {
             println!(
-                "written to {}, to look at: report.html",
+                "written to {}; report.html shows what failed",
                 self.to.folder().display()
             );
             print_failures(verdict, standing);
             eprintln!(
-                "What may help: another number of pieces (--pieces), a larger --size, labels of your own \
-                 (--labels), more --time."
+                "What may help: another number of pieces (--pieces), a larger model (--size), your own \
+                 labels (--labels), or more time (--time)."
             );
         }
     }
@@ -69,7 +69,7 @@ impl Finished<'_> {
         bears_lines(&made.kit.holding, standing)
             .into_iter()
             .for_each(|line| println!("{line}"));
-        println!("pieces sit {}", play::words(&made.kit.play));
+        println!("play of the pieces: {}", play::words(&made.kit.play));
         if let Some(line) = fits(made) {
             println!("{line}");
         }
@@ -84,7 +84,7 @@ impl Finished<'_> {
             .into_iter()
             .for_each(|line| println!("{line}"));
         println!(
-            "connectors on {:.0} % of the seam length that fits any",
+            "connectors on {:.0} % of the seam length that has room for them",
             100.0 * self.summary.connector_share
         );
         println!("{}", list_effort(&made.effort));
@@ -103,8 +103,7 @@ fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) ->
     let line = |w: &Warning| {
         let place =
             w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
-        let sentence = WarningEntry::from(w.clone()).sentence_with(|name| format!("--{name}"));
-        format!("{}: {sentence}{place}", w.severity())
+        format!("{}: {}{place}", w.severity(), sentence(w))
     };
     let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
     let n_notes = ranked[n_told..]
@@ -122,9 +121,14 @@ fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) ->
     ];
     let rest: Vec<String> = rest.into_iter().flatten().collect();
     if !rest.is_empty() {
-        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
+        lines.push(format!("and {} more (--verbose shows all)", rest.join(" and ")));
     }
     lines
+}
+
+/// Sentence of a warning, followed by the options that change it.
+pub fn sentence(warning: &Warning) -> String {
+    WarningEntry::from(warning.clone()).sentence_with(|name| format!("--{name}"))
 }
 
 /// Prints warnings on how the model's file was read, before anything else. They go to standard output, or to
@@ -132,8 +136,10 @@ fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) ->
 pub fn print_input_warnings(session: &Session, model: &Model) {
     for warning in &model.warnings {
         match session.progress_form {
-            Shown::ForPeople => println!("{}: {warning}", warning.severity()),
-            Shown::Nothing if !session.is_json => eprintln!("{}: {warning}", warning.severity()),
+            Shown::ForPeople => println!("{}: {}", warning.severity(), sentence(warning)),
+            Shown::Nothing if !session.is_json => {
+                eprintln!("{}: {}", warning.severity(), sentence(warning));
+            }
             _ => {}
         }
     }
@@ -172,7 +178,8 @@ pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
 pub fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
     if !verdict.has_passed() {
         eprintln!(
-            "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
+            "FAILED: this kit does not hold together as it should; do not print it. Failures and their \
+             places:"
         );
         for finding in &verdict.findings {
             eprintln!("  {}", finding.describe(words));

@@ -74,7 +74,7 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
     let row = table.lines().find(|line| line.contains("below/vase.stl"));
     assert!(row.is_some_and(|row| row.contains("refused")), "{table}");
     let page = String::from_utf8(bytes("kits", "batch.html")).unwrap();
-    assert!(page.contains("is of an earlier run"), "{page}");
+    assert!(page.contains("is from an earlier run"), "{page}");
 }
 
 #[cfg(unix)]
@@ -123,7 +123,7 @@ fn a_folder_without_models_and_options_that_are_wrong_are_refused_at_once() {
         assert_eq!(o.status.code(), Some(2), "{}", told(&o));
         assert!(told(&o).contains(says), "{}", told(&o));
     };
-    refused("batch models --out kits", "holds no model");
+    refused("batch models --out kits", "contains no model");
     refused("batch nowhere --out kits", "nowhere");
     refused("batch models --out kits --size big", "--size");
     refused("batch models --out kits --thickness 90mm", "thickness");

@@ -432,9 +432,9 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     fs::write(&plan, thick).unwrap();
     refused(&["plan.json", "thickness"]);
     fs::write(&plan, TWO_PIECES).unwrap();
-    refused(&["plan.json", "no file of piece 1"]);
+    refused(&["plan.json", "no file for piece 1"]);
     fs::write(&plan, with_files(TWO_PIECES)).unwrap();
-    refused(&["box.stl", "not there"]);
+    refused(&["box.stl", "missing"]);
     for file in ["box.stl", "lid.stl"] {
         fs::write(kit.join(file), "solid of nothing\nendsolid\n").unwrap();
     }

@@ -370,7 +370,7 @@ fn odd_surfaces() -> Vec<Twin> {
             ply(&both(good.clone(), ball(Vec3::X * 90.0))),
             Refused(&["2 separate bodies", "--largest"]),
         ),
-        ("soup.ply", ply(&soup()), Refused(&["do not hang together"])),
+        ("soup.ply", ply(&soup()), Refused(&["are not connected"])),
         (
             "thin.ply",
             ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))),
@@ -438,7 +438,7 @@ fn sizes_follow_units_and_thin_models_are_warned_of() {
         .contains("60.0 × 60.0 × 60.0 mm")
     );
     let metres = ply(&scaled(&good, 1e-3, Vec3::ZERO));
-    assert!(said("m.ply", metres.clone(), &[]).contains("60 mm with --unit m "));
+    assert!(said("m.ply", metres.clone(), &[]).contains("60 mm if the unit is m "));
     assert!(said("m.ply", metres, &["--unit", "m"]).contains("60.0 × 60.0 × 60.0 mm"));
     let thin = ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02)));
     let warned = said("thin.ply", thin, &[]);
@@ -461,7 +461,7 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
     run(&["segment", "ball.ply", "--pieces", "6", "-o", "painted.3mf"]);
     let told = run(&["inspect", "painted.3mf"]);
     assert!(
-        told.contains("divided by paint") && told.contains("the paint in the file divides it"),
+        told.contains("divided by paint") && told.contains("the paint in the file defines the pieces"),
         "{told}"
     );
     let pieces = |args: &[&str]| -> Value {
@@ -562,7 +562,7 @@ fn a_hollow_model_is_told_with_its_wall_and_opening_and_filled_if_asked() {
         let why = String::from_utf8_lossy(&o.stderr).into_owned();
         assert_eq!(o.status.code(), Some(2), "{why}");
         for word in [
-            "hollow already",
+            "already hollow",
             "2.4 mm thick",
             "(4.0 mm wide)",
             "--fill",
@@ -586,7 +586,7 @@ fn a_hollow_model_is_told_with_its_wall_and_opening_and_filled_if_asked() {
     assert!(note.contains("1 opening was closed, 8.0 mm wide near"), "{note}");
     // Walls of 4.8 mm are made hollow themselves if the kit's walls are thin.
     let kept = told(&["drained.stl", "--size", "120", "--thickness", "0.8"]);
-    assert!(kept["notes"].to_string().contains("hollow already"), "{kept}");
+    assert!(kept["notes"].to_string().contains("already hollow"), "{kept}");
     fs::write(dir.path().join("ball.stl"), write_stl_binary(&ball(Vec3::ZERO))).unwrap();
     let solid = told(&["ball.stl", "--fill"]);
     assert!(solid["notes"].to_string().contains("is not hollow"), "{solid}");

@@ -93,9 +93,9 @@ fn what_is_wrong_with_an_assembly_is_said_with_its_name() {
     for (change, words) in [
         (("\"pulled_out_along\": [0, 0, 1]", "\"way\": [0, 0, 1]"), "way"),
         ((", \"pulled_out_along\": [0, 0, 1]", ""), "pin.stl needs"),
-        (("[0, 0, 1]", "[0, 0, 0]"), "has no direction"),
+        (("[0, 0, 1]", "[0, 0, 0]"), "is not a direction"),
         (("0.1", "7"), "a clearance of 7 mm"),
-        (("rail.stl", "../rail.stl"), "no file within the folder"),
+        (("rail.stl", "../rail.stl"), "not a file in the folder"),
         (("rail.stl", "gone.stl"), "gone.stl"),
         (("rail.stl", "pin.stl"), "a file of its own"),
         (("rail.stl", "certificate.json"), "a file of its own"),

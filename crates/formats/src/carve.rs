@@ -51,9 +51,7 @@ fn carve_item(mut loaded: Loaded, item: u32, cutters: &[Cutter]) -> Result<Loade
         loaded.notes.push(match (cut.is_met[place], cut.was_open[place]) {
             (true, false) => format!("cut out as a negative volume: {name}"),
             (true, true) => {
-                format!(
-                    "cut out as a negative volume: {name}; its surface had holes, which were closed before"
-                )
+                format!("cut out as a negative volume: {name}; holes in its surface were closed first")
             }
             (false, _) => format!("the negative volume {name} does not meet {title}: nothing is cut out"),
         });

@@ -75,7 +75,7 @@ pub enum ReadError {
     )]
     UnknownFormat,
     /// An unsupported variant of a known format.
-    #[error("{at}: {what} is not read; export the model as 3MF, binary STL or PLY")]
+    #[error("{at}: {what} is not supported; export the model as 3MF, binary STL or PLY")]
     Unsupported {
         /// Description of the unsupported variant.
         what: &'static str,
@@ -94,8 +94,8 @@ pub enum ReadError {
     },
     /// A 3MF that requires an unsupported extension: its shape would be wrong without.
     #[error(
-        "the file requires the 3MF extension \"{name}\", which is not read; export it as a plain mesh: 3MF \
-         without extensions, or STL"
+        "the file requires the 3MF extension \"{name}\", which is not supported; export it as a plain mesh: \
+         3MF without extensions, or STL"
     )]
     Extension {
         /// Common name of the extension, or its namespace.
@@ -103,8 +103,8 @@ pub enum ReadError {
     },
     /// An object whose shape is given in an unsupported way.
     #[error(
-        "{object} is not given by a mesh alone, but by \"{shape}\", which is not read; export it as a plain \
-         mesh: 3MF without extensions, or STL"
+        "{object} is not given by a mesh alone, but by \"{shape}\", which is not supported; export it as a \
+         plain mesh: 3MF without extensions, or STL"
     )]
     Shape {
         /// Object, by its name or number.
@@ -114,14 +114,12 @@ pub enum ReadError {
     },
     /// Tool paths for a printer instead of a model.
     #[error(
-        "this is a sliced file: it holds G-code for a printer and no model; give the project that it was \
+        "this is a sliced file: it contains G-code for a printer and no model; give the project that it was \
          sliced from (.3mf)"
     )]
     Sliced,
     /// A file in which nothing is to be printed.
-    #[error(
-        "the file has nothing but {what} ({names}), which are left out; give a file with the model itself"
-    )]
+    #[error("the file contains only {what} ({names}), which are left out; give a file with the model itself")]
     NothingPrinted {
         /// Kind of the parts present.
         what: &'static str,
@@ -137,7 +135,7 @@ pub enum ReadError {
         reason: String,
     },
     /// A plate of which nothing is printed.
-    #[error("plate {plate} holds nothing that the slicer is to print; what is printed lies on: {has}")]
+    #[error("plate {plate} has nothing to print; plates with something to print: {has}")]
     EmptyPlate {
         /// The number or name asked for.
         plate: String,
@@ -153,7 +151,7 @@ pub enum ReadError {
         reason: String,
     },
     /// An object of which a cut leaves nothing.
-    #[error("nothing is left of \"{object}\" after {cutters} is cut out; make what is cut out smaller")]
+    #[error("nothing is left of \"{object}\" after {cutters} is cut out; make the negative volume smaller")]
     NothingLeft {
         /// Name of the object.
         object: String,
@@ -251,7 +249,8 @@ pub enum ReadError {
     },
     /// A coordinate that is NaN, infinite, or too large for a float.
     #[error(
-        "{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made"
+        "{at}: a coordinate is not a finite number (NaN or infinite); repair the model in the program that \
+         made it"
     )]
     NotFinite {
         /// Place of the coordinate.

@@ -130,8 +130,7 @@ fn note_of_others(passed_over: &BTreeMap<&[u8], usize>) -> Option<String> {
     let more = if passed_over.len() > QUOTED { ", …" } else { "" };
     (n > 0).then(|| {
         format!(
-            "statements that are not read were passed over: {n}, by {}{more}; surfaces among them are \
-             missing",
+            "unsupported statements were skipped: {n}, by {}{more}; any surfaces among them are missing",
             shown.collect::<Vec<_>>().join(", ")
         )
     })

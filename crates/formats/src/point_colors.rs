@@ -50,7 +50,7 @@ pub(super) fn divide(loaded: &mut Loaded, colors: &[Color]) {
     let n_colors = count_used(loaded, colors);
     if n_colors > MAX_COLORS {
         loaded.notes.push(format!(
-            "the points have {n_colors} colours, too many to divide it by"
+            "the points have {n_colors} colours, too many to define pieces"
         ));
         return;
     }
@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(few.notes, Vec::<String>::new());
         let many = fan(MAX_COLORS + 1);
         assert_eq!(many.labels(LabelSource::Color), None);
-        assert_note(&many, "the points have 65 colours, too many to divide it by");
+        assert_note(&many, "the points have 65 colours, too many to define pieces");
     }
 
     #[test]

@@ -102,7 +102,7 @@ pub(super) fn select(mut loaded: Loaded, selection: &Selection) -> Result<Loaded
     let is_chosen = *selection != Selection::default();
     if is_chosen && n > 1 {
         let were = if n_wanted == 1 { "was" } else { "were" };
-        let note = format!("{n_wanted} of {n} objects or parts {were} taken");
+        let note = format!("{n_wanted} of {n} objects or parts {were} used");
         if n_wanted < n {
             loaded = keep(loaded, &is_wanted);
         }

@@ -35,7 +35,7 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     }
     if n_files > 1 {
         notes.push(format!(
-            "the file is {n_files} STL files one after the other; all were read"
+            "the file contains {n_files} STL files in sequence; all were read"
         ));
     }
     let mut loaded = polygons.finish(Format::StlBinary, vec![(LabelSource::Color, colors.labels)])?;
@@ -107,14 +107,14 @@ fn count(body: &[u8], promised: u64, base: usize, notes: &mut Vec<String>) -> Re
     };
     if n_promised < held && (is_unknown || trailing.chunks_exact(TRIANGLE_BYTES).all(is_like)) {
         notes.push(format!(
-            "the header promises {promised} triangles, the file holds {held}; all are read"
+            "the header promises {promised} triangles, the file contains {held}; all were read"
         ));
         return Ok(held);
     }
     // Up to a triangle's length is padding.
     if trailing.len() >= TRIANGLE_BYTES {
         notes.push(format!(
-            "{} bytes after the last triangle are no triangles and were passed over",
+            "{} bytes after the last triangle are not triangles and were skipped",
             trailing.len()
         ));
     }

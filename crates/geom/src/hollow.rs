@@ -68,8 +68,8 @@ pub struct Filled {
 /// Error: an opening cannot be closed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the opening near ({:.1}, {:.1}, {:.1}) mm is no plain hole that could be closed; \
-     close it in a modelling program",
+    "the opening near ({:.1}, {:.1}, {:.1}) mm is not a plain hole that can be closed here; close it in a \
+     modelling program",
     at.x, at.y, at.z
 )]
 pub struct CannotFill {

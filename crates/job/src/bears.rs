@@ -33,24 +33,25 @@ fn metres(m: f64) -> String {
 /// Lists the loads that a kit can take: what is done to it, and the largest figure.
 pub fn figures(bears: &Bears) -> Vec<(&'static str, String)> {
     let mut all = vec![(
-        "pressed on its top",
-        bears
-            .top_n
-            .map_or("too narrow there, or it would tip over".to_owned(), newtons),
+        "press on the top",
+        bears.top_n.map_or(
+            "not possible (too narrow, or it would tip over)".to_owned(),
+            newtons,
+        ),
     )];
-    all.extend(bears.middle_n.map(|n| ("pressed on its middle", newtons(n))));
+    all.extend(bears.middle_n.map(|n| ("press on the middle", newtons(n))));
     all.extend(
         bears
             .sides_n
-            .map(|n| ("pressed on its sides as it lies", newtons(n))),
+            .map(|n| ("press while lying on its side", newtons(n))),
     );
-    all.extend(bears.grip_n.map(|n| ("gripped by two fingers", newtons(n))));
+    all.extend(bears.grip_n.map(|n| ("grip with two fingers", newtons(n))));
     all.extend(
         bears
             .fall_upright_m
-            .map(|m| ("falls onto its feet from", metres(m))),
+            .map(|m| ("fall onto its feet from", metres(m))),
     );
-    all.extend(bears.fall_m.map(|m| ("falls onto any side from", metres(m))));
+    all.extend(bears.fall_m.map(|m| ("fall onto any side from", metres(m))));
     all
 }
 
@@ -63,8 +64,8 @@ pub fn lines(holding: &Holding, standing: &Standing) -> Vec<String> {
         .into_iter()
         .map(|(what, much)| format!("{what} {much}"))
         .collect();
-    let mut lines = vec![format!("bears, {BY_SIMULATION}: {}", said.join(", "))];
-    lines.extend(weakest(holding, standing).map(|w| format!("gives way first {w}")));
+    let mut lines = vec![format!("largest loads ({BY_SIMULATION}): {}", said.join(", "))];
+    lines.extend(weakest(holding, standing).map(|w| format!("fails first {w}")));
     lines
 }
 
@@ -73,7 +74,7 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     let worst = holding.weakest_use()?;
     let first = worst.first?;
     Some(format!(
-        "where it is {}: {} ({})",
+        "when {}: {} ({})",
         worst.deed.words(),
         gives_way(&first),
         standing.words(first.at)
@@ -84,23 +85,23 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
 pub fn gives_way(first: &GivesWay) -> String {
     let [a, b] = first.between;
     match first.how {
-        Failure::Opens => format!("the seam of pieces {a} and {b} opens"),
-        Failure::PinYields => format!("pins between pieces {a} and {b} bend"),
-        Failure::WallYields => format!("walls at pieces {a} and {b} yield"),
+        Failure::Opens => format!("the seam between pieces {a} and {b} opens"),
+        Failure::PinYields => format!("the pins between pieces {a} and {b} bend"),
+        Failure::WallYields => format!("the walls of pieces {a} and {b} yield"),
     }
 }
 
 /// Name of a load in a list, before its figure.
 pub fn load_name(told: Told) -> &'static str {
     match told {
-        Told::Top => "pressed on its top",
-        Told::Middle => "pressed on its middle",
-        Told::Side => "pressed as it lies",
-        Told::GripNarrow => "gripped where narrow",
-        Told::GripWide => "gripped where wide",
-        Told::Feet => "falls onto its feet from",
-        Told::AnySide => "falls onto any side from",
-        Told::Lifted => "lifted by one piece, weighing",
+        Told::Top => "press on the top",
+        Told::Middle => "press on the middle",
+        Told::Side => "press while lying on its side",
+        Told::GripNarrow => "grip where narrow",
+        Told::GripWide => "grip where wide",
+        Told::Feet => "fall onto its feet from",
+        Told::AnySide => "fall onto any side from",
+        Told::Lifted => "lift by one piece, weight",
     }
 }
 
@@ -129,24 +130,24 @@ pub fn figure(borne: &LoadBorne) -> String {
 pub fn sentence(as_told: Told, borne: &LoadBorne) -> String {
     let what = load_name(as_told)
         .trim_end_matches(" from")
-        .trim_end_matches(", weighing");
+        .trim_end_matches(", weight");
     let is_fall = matches!(borne.deed, Deed::FallUpright | Deed::Fall { .. });
     let with = if is_fall { "from" } else { "with" };
     let (figure, factor) = (figure(borne), cap_factor(borne));
     match &borne.first {
         Some(first) if factor < HARDLY => {
             format!(
-                "{what}: hardly anything holds, {}; {BY_SIMULATION}",
+                "{what}: fails under almost no load: {}; {BY_SIMULATION}",
                 gives_way(first)
             )
         }
         Some(first) if factor < MOST_TIMES => {
             format!(
-                "{what} {with} {figure}: then {}; {BY_SIMULATION}",
+                "{what} {with} {figure}: beyond that, {}; {BY_SIMULATION}",
                 gives_way(first)
             )
         }
-        None if factor < HARDLY => format!("{what}: it comes apart; {BY_SIMULATION}"),
-        _ => format!("{what}: nothing gives way, it bears {figure}; {BY_SIMULATION}"),
+        None if factor < HARDLY => format!("{what}: the kit comes apart; {BY_SIMULATION}"),
+        _ => format!("{what}: nothing fails, it can take {figure}; {BY_SIMULATION}"),
     }
 }

@@ -65,8 +65,8 @@ impl<'a> Fitting<'a> {
         while self.misfits(Some(n_pieces), None)?.1 > 0 {
             if n_pieces == MOST_PIECES {
                 return Err(Failure::Wrong(format!(
-                    "even {MOST_PIECES} pieces do not fit the printer {}; make it smaller (--size), or \
-                     choose another printer (--printer)",
+                    "even {MOST_PIECES} pieces do not fit the printer {}; make the model smaller (--size), \
+                     or choose another printer (--printer)",
                     describe(self.printer)
                 )));
             }
@@ -104,9 +104,9 @@ pub fn too_large(
         }
     }
     let remedy = match (enough, &model.labels) {
-        (Some(n), None) => format!("about {n} pieces would do (--pieces {n})"),
-        (Some(n), Some(_)) => format!("divide them further: about {n} pieces of even size would do"),
-        (None, _) => "make it smaller (--size), or choose another printer (--printer)".to_owned(),
+        (Some(n), None) => format!("about {n} pieces would fit (--pieces {n})"),
+        (Some(n), Some(_)) => format!("divide them further: about {n} pieces of equal size would fit"),
+        (None, _) => "make the model smaller (--size), or choose another printer (--printer)".to_owned(),
     };
     Ok(Some(format!(
         "{n_misfits} of {n} pieces will not fit the printer {}; {remedy}",
@@ -127,14 +127,14 @@ pub fn fit_params(
         return Ok(params.clone());
     }
     if model.labels.is_some() {
-        let problem = "--pieces fits-bed chooses the pieces, but labels say what they are: leave out one of \
-                       both (--labels-from none leaves out those in the model's file)";
+        let problem = "--pieces fits-bed chooses the pieces, but labels already define them: leave out one \
+                       of the two (--labels-from none ignores labels in the model's file)";
         return Err(Failure::Wrong(problem.to_owned()));
     }
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let settings = Settings::resolve(params);
     let fitting = Fitting::new(session, &settings, &printer, model);
-    let n_pieces = session.during("how many pieces fit", || fitting.fewest())?;
+    let n_pieces = session.during("number of pieces that fit", || fitting.fewest())?;
     let mut params = params.clone();
     params.n_pieces = Some(n_pieces);
     Ok(params)

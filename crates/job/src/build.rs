@@ -129,7 +129,7 @@ impl<'a> Begun<'a> {
             .filter(|asked| design.kit.pieces.len() > asked + 1)
         {
             notes.push(format!(
-                "{} pieces instead of {asked}: some were divided until every piece locks",
+                "{} pieces instead of {asked}: some were divided further so that every piece locks",
                 design.kit.pieces.len()
             ));
         }
@@ -209,15 +209,14 @@ fn no_plan(none: &NoPlan) -> Failure {
         ..
     } = none;
     let mut text = match is_cut_short {
-        true => format!("{reason}; give it more time (--time)"),
+        true => format!("{reason}; allow more time (--time)"),
         false => format!("no plan was found: {reason}"),
     };
     for b in blockers {
         let [x, y, z] = b.at;
         let share = 100.0 * b.occluded;
         text += &format!(
-            "\n  piece {} is in the way of piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it hides {share:.0} % \
-             of it",
+            "\n  piece {} blocks piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it covers {share:.0} % of it",
             b.by, b.piece
         );
     }

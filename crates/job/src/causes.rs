@@ -12,6 +12,8 @@ pub enum Cause {
         code: &'static str,
         /// Sentence that people read.
         sentence: String,
+        /// Settings by which the user can change it, most helpful first.
+        settings: &'static [&'static str],
     },
     /// Some pieces are larger than the plate of the printer.
     PieceTooLarge {
@@ -33,7 +35,11 @@ pub enum Cause {
 impl Diagnostic for Cause {
     fn tell(&self, pieces: &[PatchId]) -> Told {
         match self {
-            Self::Input { code, sentence } => Told::warning(code, sentence.clone()),
+            Self::Input {
+                code,
+                sentence,
+                settings,
+            } => Told::warning(code, sentence.clone()).by(settings),
             Self::PieceTooLarge { printer } => Told::problem(
                 "piece-too-large",
                 format!(

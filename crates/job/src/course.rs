@@ -78,7 +78,7 @@ impl Stand {
         const STEP_S: f64 = 5.0;
         let left = self.time_left.map_or_else(String::new, |left| {
             let s = ((left.as_secs_f64() / STEP_S).ceil() * STEP_S).max(STEP_S);
-            format!(", about {s:.0} s left if it passes")
+            format!(", about {s:.0} s left unless a retry is needed")
         });
         self.words(name) + &left
     }

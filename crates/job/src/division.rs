@@ -119,15 +119,13 @@ impl Division {
         };
         let n = pieces.len();
         let areas = format!(
-            "{n}, of {:.0} to {:.0} mm², the middle one {:.0} mm²",
+            "{n}, from {:.0} to {:.0} mm², median {:.0} mm²",
             area_mm2.least, area_mm2.largest, area_mm2.median
         );
-        let one_way = format!("{n_one_way} of {n} pieces: 95 % of their skin within 90° of one direction");
+        let one_way =
+            format!("{n_one_way} of {n} pieces: 95 % of their skin faces within 90° of one direction");
         let mirrored = mirrored_share.map(|share| {
-            let told = format!(
-                "{:.0} % of the surface has its mirror image in its piece's image",
-                100.0 * share
-            );
+            let told = format!("{:.0} % of the surface is divided symmetrically", 100.0 * share);
             ("mirrored", told)
         });
         let of_all = [
@@ -165,11 +163,11 @@ fn of_seams(seams: &SeamFigures) -> Vec<Line> {
         ("  over edges", percent(convex_share)),
         (
             "  in sight",
-            percent(visible_share) + ", the mean of eight views around the model",
+            percent(visible_share) + ", mean of eight views around the model",
         ),
         (
             "  on the front",
-            percent(front_share) + ": in sight from the front, and in no crease",
+            percent(front_share) + ": in sight from the front, and not in a crease",
         ),
     ]
 }
@@ -186,7 +184,7 @@ fn of_contacts(contacts: &ContactFigures, params: &SegmentationParams) -> Vec<Li
     }
     if contacts.n_short > 0 {
         let n = contacts.n_short;
-        told += &format!("; {n} more shorter than {min_contact_mm:.1} mm, which hold nothing");
+        told += &format!("; {n} more are shorter than {min_contact_mm:.1} mm and hold nothing");
     }
     vec![
         ("contacts", told),
@@ -197,7 +195,7 @@ fn of_contacts(contacts: &ContactFigures, params: &SegmentationParams) -> Vec<Li
 fn hold_words(n_faults: usize, hold_alone: &[PatchId]) -> String {
     match (n_faults, hold_alone) {
         (0, _) => "no piece alone holds others".to_owned(),
-        (n, []) => format!("not together: {n} faults"),
+        (n, []) => format!("not connected: {n} faults"),
         (n, [one]) => format!("piece {one} alone holds others: {n} faults"),
         (n, several) => format!("pieces {} alone hold others: {n} faults", list_pieces(several)),
     }

@@ -68,7 +68,7 @@ pub enum Failure {
     #[error("stopped; nothing was written")]
     Stopped,
     /// The user stopped a batch.
-    #[error("stopped; kits that are made stay, and the same command goes on from here")]
+    #[error("stopped; finished kits are kept, and the same command continues from here")]
     BatchStopped,
 }
 
@@ -77,7 +77,7 @@ fn hint(error: &InputError, objects: &[String]) -> String {
     match error {
         InputError::Bodies(_) => {}
         InputError::Cutter { .. } => {
-            return " (--inside-out cut makes the hole, --inside-out unite the part)".to_owned();
+            return " (--inside-out cut makes it a hole, --inside-out unite makes it a part)".to_owned();
         }
         _ => return String::new(),
     }

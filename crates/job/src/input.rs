@@ -63,7 +63,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     if size > MAX_FILE_BYTES {
         let gib = size as f64 / f64::from(1 << 30);
         return Err(Failure::Wrong(format!(
-            "{}: {gib:.1} GiB are more than the 2 GiB that are read",
+            "{}: {gib:.1} GiB is more than the limit of 2 GiB",
             path.display()
         )));
     }
@@ -175,8 +175,8 @@ fn simplify_model(mut model: Model, resolution_mm: f64) -> Result<Model, Failure
     match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
         Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
             model.notes.push(format!(
-                "of {n_before} triangles {} are enough: none is farther than {:.3} mm from the surface as \
-                 it was given (--resolution 0 uses all)",
+                "the surface was simplified from {n_before} to {} triangles, within {:.3} mm of the original \
+                 (--resolution 0 keeps all)",
                 simple.solid.mesh().triangles.len(),
                 simple.farthest_mm
             ));
@@ -190,8 +190,8 @@ fn simplify_model(mut model: Model, resolution_mm: f64) -> Result<Model, Failure
             model.solid = simple.solid;
         }
         _ => model.notes.push(format!(
-            "{n_before} triangles could not be made fewer within {resolution_mm} mm of the surface: all are \
-             used, which takes longer"
+            "{n_before} triangles could not be simplified within {resolution_mm} mm of the surface: all are \
+             kept, which takes longer"
         )),
     }
     Ok(model)
@@ -265,14 +265,14 @@ fn own_labels<'a>(
                 .find(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint))
             {
                 Some(own) if own.source == LabelSource::Paint => {
-                    notes.push("the paint in the file divides it".to_owned())
+                    notes.push("the paint in the file defines the pieces".to_owned())
                 }
                 Some(_) => {
-                    notes.push("the file has a label for each face; they are used as pieces".to_owned())
+                    notes.push("the file has a label for each face; the labels define the pieces".to_owned())
                 }
                 None => notes.extend(loaded.labellings.iter().map(|other| {
                     let source = other.source;
-                    format!("the file has {source}; with --labels-from {source} they divide it into pieces")
+                    format!("the file has {source}; with --labels-from {source} they define the pieces")
                 })),
             }
             return Ok(loaded.face_labels());
@@ -293,7 +293,7 @@ fn own_labels<'a>(
     };
     let wrong = || {
         Failure::Wrong(format!(
-            "{}: no {source} divide it; what does: {has}",
+            "{}: it has no {source} to divide it by; it has {has}",
             path.display()
         ))
     };
@@ -367,7 +367,7 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
         let (with, _) = load(file)?;
         let labels = with.face_labels().ok_or_else(|| {
             Failure::Wrong(format!(
-                "{}: its faces have no property named label, segment or the like",
+                "{}: its faces have no property named label, segment or similar",
                 file.display()
             ))
         })?;
@@ -385,7 +385,8 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
     };
     if a_file_face.len() != n {
         return Err(Failure::Wrong(format!(
-            "{}: {} labels for a model of {n} faces; give one label a face, in the order of the model's file",
+            "{}: {} labels for a model of {n} faces; give one label per face, in the order of the model's \
+             file",
             file.display(),
             a_file_face.len()
         )));

@@ -103,13 +103,13 @@ pub fn broken<E: fmt::Display>(kit: &Path) -> impl Fn(E) -> Failure {
 pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Solid, Failure> {
     let Some(input) = &plan.input else {
         return Err(broken(kit)(
-            "it does not say from which model it was made (\"input\")",
+            "it does not name the model that it was made from (\"input\")",
         ));
     };
     let model_path = model.map_or_else(|| PathBuf::from(&input.file), Path::to_owned);
     if model.is_none() && !model_path.exists() {
         return Err(broken(kit)(format!(
-            "there is no file {} here, from which it was made; name the model after the kit",
+            "the file {} that it was made from is not here; name the model after the kit",
             input.file
         )));
     }
@@ -136,7 +136,7 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
         }));
     }
     let solid = Solid::new(mesh)
-        .map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))?;
+        .map_err(|e| broken(kit)(format!("after its transform the model is not a solid: {e}")))?;
     filled_again(solid, &repairs).map_err(broken(kit))
 }
 
@@ -162,7 +162,7 @@ pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<KitOnDisk, Failure> {
         let is_normal = |c: Component<'_>| matches!(c, Component::Normal(_));
         if !Path::new(file).components().all(is_normal) {
             return Err(broken(format!(
-                "piece {id} names \"{file}\", which is no file within the kit"
+                "piece {id} names \"{file}\", which is not a file in the kit"
             )));
         }
         let (loaded, bytes) = load(&kit.join(file))?;

@@ -41,7 +41,7 @@ pub fn loads(design: &Design, standing: &Standing, stand: impl Fn(Vec3) -> Vec3)
     let weakest = kit.holding.weakest_use().and_then(|worst| worst.first);
     let weakest = bears::weakest(&kit.holding, standing).zip(weakest);
     ReportLoads {
-        title: "What it bears".into(),
+        title: "Loads it can take".into(),
         note: note(design),
         carriers: carriers.into_iter().map(turned).collect(),
         loads: kit.deformation.loads.iter().map(load).collect(),
@@ -55,11 +55,11 @@ fn note(design: &Design) -> String {
     let top = if is_there(Told::Top) {
         ""
     } else {
-        " It is not pressed on its top: too narrow there, or it would tip over."
+        " There is no press on the top: it is too narrow there, or it would tip over."
     };
     format!(
-        "Figures are {}. A load shows how pieces bend and part, far larger than it is; how the whole moves \
-         along is left out.{top}",
+        "Figures are {}. Choose a load to see how the pieces bend and separate. The motion is exaggerated, \
+         and that of the whole model is left out.{top}",
         bears::BY_SIMULATION
     )
 }
@@ -92,9 +92,9 @@ fn carriers(deformed: &Deformed, n_pieces: usize) -> (Vec<TriMesh>, Vec<Vec<usiz
 /// Arrows of the forces that act, labelled with their figure or role.
 fn arrows(load: &DeformedLoad, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportArrow> {
     let words: [&str; 2] = match load.capacity.deed {
-        Deed::GripNarrow | Deed::GripWide => ["one finger", "the other"],
-        Deed::FallUpright | Deed::Fall { .. } => ["the floor stops it", ""],
-        Deed::Hang { .. } => ["held here", "its weight"],
+        Deed::GripNarrow | Deed::GripWide => ["one finger", "other finger"],
+        Deed::FallUpright | Deed::Fall { .. } => ["floor", ""],
+        Deed::Hang { .. } => ["held here", "weight"],
         Deed::PressTop | Deed::PressMiddle | Deed::PressSide { .. } => ["", ""],
     };
     let n = if floor(load).is_some() { 1 } else { 2 };
@@ -124,9 +124,9 @@ fn floor(load: &DeformedLoad) -> Option<[Vec3; 2]> {
 fn place(surface: &SegmentedSurface, first: &GivesWay, stand: impl Fn(Vec3) -> Vec3) -> ReportPlace {
     let [a, b] = first.between;
     let name = match first.how {
-        Failure::Opens => format!("the seam of pieces {a} and {b} opens here"),
-        Failure::PinYields => format!("pins between pieces {a} and {b} bend here"),
-        Failure::WallYields => format!("walls at pieces {a} and {b} yield here"),
+        Failure::Opens => format!("the seam between pieces {a} and {b} opens here"),
+        Failure::PinYields => format!("the pins between pieces {a} and {b} bend here"),
+        Failure::WallYields => format!("the walls of pieces {a} and {b} yield here"),
     };
     let line = seam_through(surface, first.between, Vec3::from(first.at));
     let rounded = |p: Vec3| stand(p).to_array().map(|x| (100.0 * x).round() / 100.0);

@@ -76,14 +76,14 @@ impl Destination {
             return refuse("is a file; choose a folder with -o");
         }
         if has_content && !is_kit {
-            return refuse("holds files that are no kit; choose another folder with -o");
+            return refuse("contains files that are not a kit; choose another folder with -o");
         }
         if has_content && !force {
-            return refuse("holds a kit already; choose another folder with -o, or --force to replace it");
+            return refuse("already contains a kit; choose another folder with -o, or --force to replace it");
         }
         if let Some(foreign) = foreign_file(&folder) {
             return refuse(&format!(
-                "holds {foreign}, which is not of the kit and would be lost; move it away, or choose \
+                "contains {foreign}, which is not part of the kit and would be lost; move it, or choose \
                  another folder with -o"
             ));
         }

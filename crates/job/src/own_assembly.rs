@@ -70,7 +70,7 @@ impl OwnAssembly {
                 .components()
                 .all(|c| matches!(c, Component::Normal(_)))
             {
-                return Err(wrong(format!("\"{file}\" is no file within the folder")));
+                return Err(wrong(format!("\"{file}\" is not a file in the folder")));
             }
             // As paths: "a//b.stl" and, on Windows, "a\\b.stl" are "a/b.stl".
             let is_file = |other: &str| Path::new(other) == Path::new(file);
@@ -117,10 +117,12 @@ impl OwnAssembly {
 /// Plan of the named pieces: their order and directions. Fails if a direction or the clearance, mm, is wrong.
 pub fn plan(pieces: &[(&str, Option<[f64; 3]>)], clearance_mm: f64) -> Result<InstallationPlan, String> {
     if !(0.0..=1.0).contains(&clearance_mm) {
-        return Err(format!("a clearance of {clearance_mm} mm is none; 0 to 1 mm are"));
+        return Err(format!(
+            "a clearance of {clearance_mm} mm is not possible; it must be 0 to 1 mm"
+        ));
     }
     if pieces.len() < 2 {
-        return Err("an assembly has at least two pieces".to_owned());
+        return Err("an assembly needs at least two pieces".to_owned());
     }
     let step = |(i, &(name, along)): (usize, &(&str, Option<[f64; 3]>))| {
         let along = match along {
@@ -128,11 +130,12 @@ pub fn plan(pieces: &[(&str, Option<[f64; 3]>)], clearance_mm: f64) -> Result<In
             None if i == 0 => Vec3::Z,
             None => {
                 return Err(format!(
-                    "{name} needs \"pulled_out_along\": the way it is taken out again"
+                    "{name} needs \"pulled_out_along\": the direction in which it is taken out"
                 ));
             }
         };
-        let way = Direction::of(along).ok_or_else(|| format!("the way of {name} has no direction"))?;
+        let way = Direction::of(along)
+            .ok_or_else(|| format!("\"pulled_out_along\" of {name} is not a direction"))?;
         Ok((PatchId::from(i), way))
     };
     let steps = pieces.iter().enumerate().map(step).collect::<Result<Vec<_>, _>>();

@@ -148,7 +148,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         .filter(|(piece, swings)| *piece != design.kit.plan.key() && !swings.is_empty())
         .map(shake)
         .collect();
-    let title = "each piece as far as its clearance lets it move while the others rest".to_owned();
+    let title = "each piece moves as far as its clearance allows while the others stay still".to_owned();
     let shake = ReportMotion {
         name: "shake".into(),
         title,
@@ -157,10 +157,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     };
     let way_out = |(piece, poses): &(PatchId, Vec<[f64; 6]>)| ReportMotion {
         name: format!("piece {piece} comes out"),
-        title: format!(
-            "how piece {piece} can be worked out of its place though it is not the key: do not print this \
-             kit"
-        ),
+        title: format!("piece {piece} can be worked loose although it is not the key: do not print this kit"),
         is_loop: false,
         moves: vec![ReportMove {
             piece: usize::from(*piece),
@@ -256,10 +253,13 @@ fn kit_facts(
                 100.0 * summary.volume_ratio
             ),
         ),
-        ("fits if printed within".into(), printed_within(design)),
+        ("print accuracy needed".into(), printed_within(design)),
         (
             "seams with connectors".into(),
-            format!("{:.0} % of what fits", 100.0 * summary.connector_share),
+            format!(
+                "{:.0} % of the length that has room for them",
+                100.0 * summary.connector_share
+            ),
         ),
     ];
     facts.extend(
@@ -285,8 +285,11 @@ fn bearing_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> 
         .into_iter()
         .map(|(what, much)| (what.to_owned(), much))
         .collect();
-    facts.extend(bears::weakest(holding, standing).map(|w| ("gives way first".to_owned(), w)));
-    facts.push(("these figures are".to_owned(), bears::BY_SIMULATION.to_owned()));
+    facts.extend(bears::weakest(holding, standing).map(|w| ("fails first".to_owned(), w)));
+    facts.push((
+        "source of these figures".to_owned(),
+        bears::BY_SIMULATION.to_owned(),
+    ));
     facts
 }
 
@@ -310,7 +313,7 @@ fn title(name: &str) -> String {
 fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
     vec![
         format!("{} pieces, {}", shown.len(), size(shown)),
-        "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
+        "no glue: each piece locks those before it, and the last one, the key, locks them all".to_owned(),
     ]
 }
 
@@ -318,7 +321,7 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
 fn printed_within(design: &Design) -> String {
     match design.fit.within_mm {
         Some(mm) if mm > 0.0 => format!("± {mm:.2} mm"),
-        _ => "surfaces cross; see the warnings".to_owned(),
+        _ => "surfaces overlap; see the warnings".to_owned(),
     }
 }
 
@@ -328,11 +331,14 @@ fn plan_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
         proof: p, holding, ..
     } = &design.kit;
     let how = if p.optimal {
-        "proven to be the least with".into()
+        "proven to be the least possible with".into()
     } else {
-        format!("at least {:.2} with", p.lower_bound)
+        format!("no less than {:.2} is possible with", p.lower_bound)
     };
-    let cost = ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)));
+    let cost = (
+        "cost of the plan".into(),
+        format!("{:.2}; {how} {}", p.cost, scope(p)),
+    );
     let weakest = holding.seams.first().map(|s| {
         let place = standing.words(s.at);
         let figure = format!(

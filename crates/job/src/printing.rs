@@ -91,11 +91,14 @@ impl Printing {
         let outer_mm2: f64 = self.plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let supports = match self.printer.process {
             Process::Sls => String::new(),
-            _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
+            _ => format!(
+                "; {:.1} cm² of the outer surface need supports",
+                outer_mm2 / 100.0
+            ),
         };
         let rest = match self.plates.too_large.len() {
             0 => format!("; {}", self.cost_words()),
-            n => format!("; {n} pieces are not on them"),
+            n => format!("; {n} pieces do not fit on them"),
         };
         let plates = if n == 1 { "plate" } else { "plates" };
         format!(
@@ -136,15 +139,18 @@ impl Printing {
         let mut figures = vec![
             ("printer".to_owned(), describe(&self.printer)),
             ("plates".to_owned(), n.to_string()),
-            ("all plates, about".to_owned(), self.cost.words()),
+            ("all plates, estimated".to_owned(), self.cost.words()),
         ];
         if let Some(whole) = self.whole {
-            let name = format!("the whole model {}", whole_words(self.printer.process));
+            let name = format!(
+                "for comparison, the whole model {}",
+                whole_words(self.printer.process)
+            );
             figures.push((name, whole.words()));
         }
         if self.printer.process != Process::Sls {
-            let supports = format!("{:.1} cm² of the outer skin", outer_mm2 / 100.0);
-            figures.push(("supports stand on".to_owned(), supports));
+            let supports = format!("{:.1} cm² of the outer surface", outer_mm2 / 100.0);
+            figures.push(("supports touch".to_owned(), supports));
         }
         figures
     }

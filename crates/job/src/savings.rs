@@ -227,7 +227,7 @@ impl Slicer {
         const WHOLE: &str = "the whole model";
         let laid = lay_alone(printer, solid.mesh());
         let laid =
-            laid.ok_or_else(|| NoEstimate::Because(format!("no pose to print {WHOLE} in was found")))?;
+            laid.ok_or_else(|| NoEstimate::Because(format!("no orientation to print {WHOLE} in was found")))?;
         let object = NamedObject {
             name: "solid",
             color: [200; 3],
@@ -247,7 +247,7 @@ impl Slicer {
         let filled = is_filament.then(|| self.cost_of(printer, WHOLE, &model, FILLED));
         let (filled, note) = match filled {
             Some(Ok(cost)) => (Some(cost), None),
-            Some(Err(NoEstimate::Because(why))) => (None, Some(format!("filled to 100 %: {why}"))),
+            Some(Err(NoEstimate::Because(why))) => (None, Some(format!("at 100 % infill: {why}"))),
             Some(Err(failed)) => return Err(failed),
             None => (None, None),
         };
@@ -292,12 +292,12 @@ impl Slicer {
         let done = done.map_err(|e| NoEstimate::Because(format!("PrusaSlicer could not be started: {e}")))?;
         if !done.success() {
             return Err(NoEstimate::Because(format!(
-                "PrusaSlicer does not slice {name} ({done})"
+                "PrusaSlicer failed to slice {name} ({done})"
             )));
         }
         estimate(&out, printer).map_err(|why| {
             NoEstimate::Because(format!(
-                "the estimate of PrusaSlicer for {name} could not be read: {why}"
+                "PrusaSlicer's estimate for {name} could not be read: {why}"
             ))
         })
     }
@@ -330,7 +330,7 @@ fn filament_estimate(code: &str) -> Result<(f64, f64), String> {
         value.ok_or_else(|| format!("there is no \"{name}\""))
     };
     let time = value("estimated printing time (normal mode)")?;
-    let seconds = seconds_in(time).ok_or_else(|| format!("\"{time}\" is no time"))?;
+    let seconds = seconds_in(time).ok_or_else(|| format!("\"{time}\" is not a time"))?;
     Ok((seconds, number(value("filament used [cm3]")?)?))
 }
 
@@ -348,7 +348,7 @@ fn resin_estimate(config: &str) -> Result<(f64, f64), String> {
 
 fn number(text: &str) -> Result<f64, String> {
     let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite());
-    number.ok_or_else(|| format!("\"{}\" is no number", text.trim()))
+    number.ok_or_else(|| format!("\"{}\" is not a number", text.trim()))
 }
 
 /// Reads the `config.ini` of the archive `out`.
@@ -431,7 +431,7 @@ mod tests {
         says(of("printTimes = 1\nusedMaterial = 12.5\n"), "no \"printTime\"");
         says(
             of("printTime = nan\nusedMaterial = 12.5\n"),
-            "\"nan\" is no number",
+            "\"nan\" is not a number",
         );
         says(read(&archive("other.ini", "printTime = 1")), "config.ini");
         says(read(b"no archive"), "rchive");
@@ -450,7 +450,7 @@ mod tests {
         assert!(
             read(&format!("{used}{soon}"))
                 .unwrap_err()
-                .contains("\"soon\" is no time")
+                .contains("\"soon\" is not a time")
         );
     }
 }

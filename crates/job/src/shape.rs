@@ -38,19 +38,20 @@ pub fn settle_hollow(model: &mut Model, options: &Options) -> Result<(), Failure
         return Ok(());
     }
     let told = format!(
-        "the model is hollow already: its wall is {:.1} mm thick, and {} into its cavity of {}",
+        "the model is already hollow: its wall is {:.1} mm thick, and {} into its cavity of {}",
         hollow.wall_mm,
         leads(&hollow.openings),
         volume(hollow.cavity_mm3)
     );
     if hollow.wall_mm > ROOM_WALLS * wall_mm(options) {
         model.notes.push(format!(
-            "{told}; the wall itself is made hollow (--fill closes the opening and makes the solid instead)"
+            "{told}; the wall is thick enough to be made hollow itself (--fill closes the opening and uses \
+             the solid shape instead)"
         ));
         return Ok(());
     }
     Err(Failure::Wrong(format!(
-        "{}: {told}; give the solid figure, or close what leads in with --fill, which makes it solid",
+        "{}: {told}; use a solid model, or close the openings with --fill, which makes this one solid",
         model.name
     )))
 }
@@ -64,8 +65,8 @@ pub fn filled_again(solid: Solid, repairs: &[&str]) -> Result<Solid, String> {
         return Ok(solid);
     }
     let hollow = find_hollow(&solid, LEAST_FILLED).ok_or_else(|| {
-        "the kit was made of a hollow model that was filled, but no cavity is found in this one: name the \
-         model that the kit was made from"
+        "the kit was made from a hollow model that was filled, but this model has no cavity: give the model \
+         that the kit was made from"
             .to_owned()
     })?;
     fill(&solid, &hollow)
@@ -86,7 +87,7 @@ fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
         n => format!("{n} openings were"),
     };
     model.notes.push(format!(
-        "{n} closed, {}, and the cavity of {} behind filled (--fill)",
+        "{n} closed, {}, and the cavity of {} inside was filled (--fill)",
         places(openings, |o| format!(
             "{:.1} mm wide near {}",
             o.width_mm,
@@ -134,9 +135,8 @@ fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
         String::new()
     };
     vec![format!(
-        "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; with such \
-         walls it is solid there, without connectors: make the model larger (--size) or the wall thinner \
-         (--thickness)",
+        "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; it stays solid \
+         there, without connectors: make the model larger or the wall thinner",
         largest.join(", ")
     )]
 }
@@ -164,7 +164,7 @@ fn slit_warning(model: &Model, options: &Options) -> Option<String> {
     };
     Some(format!(
         "{n} narrower than {below_mm:.2} mm: {}; pieces on both sides have less room than a seam needs, and \
-         prints fuse there: close it or make it wider in a modelling program",
+         may fuse in the print: close or widen it in a modelling program",
         places(&found, told)
     ))
 }

@@ -72,7 +72,7 @@ impl StressTest {
     pub fn read(kit: &Path, blows: &Blows) -> Result<Self, Failure> {
         if !kit.join(PLAN).exists() {
             return Err(Failure::Wrong(format!(
-                "{}: there is no kit here, for it has no plan.json; `shellock build` makes one",
+                "{}: there is no kit here, because plan.json is missing; `shellock build` makes one",
                 kit.display()
             )));
         }
@@ -128,7 +128,7 @@ fn check_kit(kit: &Path, plan: &PlanFile) -> Result<(), Failure> {
     let mut files = plan.pieces.iter().filter_map(|piece| piece.file.as_ref());
     match files.find(|file| !kit.join(file).is_file()) {
         Some(file) => Err(broken(kit)(format!(
-            "names {file}, which is not there; the kit is not complete"
+            "names {file}, which is missing; the kit is incomplete"
         ))),
         None => Ok(()),
     }
@@ -139,7 +139,7 @@ fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Vec<Solid>, Failure> {
     let piece = |(number, file): (usize, Option<&String>)| {
         let missing = || {
             broken(kit)(format!(
-                "names no file of piece {number}; the test is of finished pieces"
+                "names no file for piece {number}; the test needs the finished pieces"
             ))
         };
         let path = kit.join(file.ok_or_else(missing)?);
@@ -179,7 +179,7 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
             .and_then(|place| u32::try_from(place).ok())
             .map(PatchId)
             .filter(|&piece| usize::from(piece) < n_pieces)
-            .ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
+            .ok_or_else(|| wrong("a face has a label that is not a piece of plan.json"))
     };
     let patch_of_face: Vec<PatchId> = kept.iter().map(patch).collect::<Result<_, _>>()?;
     if (0..n_pieces).any(|piece| !patch_of_face.contains(&piece.into())) {

@@ -15,8 +15,8 @@ pub fn print(printing: &Printing, pieces: &[TriMesh], has_booklet: bool) -> Repo
     let pictures = printing.pictures(pieces);
     let of = pictures.len();
     let mut parts = vec![
-        ReportPart::Table("What it takes".into(), printing.figures()),
-        ReportPart::Text("In the slicer".into(), settings(printing.printer())),
+        ReportPart::Table("Plates, time and material".into(), printing.figures()),
+        ReportPart::Text("Slicer settings".into(), settings(printing.printer())),
     ];
     parts.extend(
         pictures
@@ -39,30 +39,30 @@ fn settings(printer: &Printer) -> Vec<String> {
     let own = match printer.process {
         Process::Sla => [
             format!(
-                "Layers of {layer} mm, the exposure that your resin asks for. Turn hollowing and drain \
-                 holes off: the pieces are hollow."
+                "Layer height {layer} mm, with the exposure time recommended for your resin. Turn off \
+                 hollowing and drain holes: the pieces are already hollow."
             ),
-            "Supports on, from the plate: pieces lie so that most of them stand on inner sides. Keep tips \
-             out of channels and off seams."
+            "Turn on supports from the build plate. The pieces are oriented so that most supports touch \
+             inner surfaces. Keep support tips out of channels and off seams."
                 .into(),
         ],
         Process::Fdm => [
             format!(
-                "Layers of {layer} mm, 3 walls or more, so that thin walls and connectors are solid. Infill \
-                 hardly matters."
+                "Layer height {layer} mm. Use at least 3 walls, so that thin walls and connectors print \
+                 solid. Infill makes little difference."
             ),
-            "Supports on, from the plate only, with a gap that comes off clean. No brim and no elephant \
-             foot on seams."
+            "Turn on supports, from the build plate only, with enough gap to come off cleanly. Do not use a \
+             brim. Turn on elephant foot compensation, so that the first layer does not bulge at seams."
                 .into(),
         ],
         Process::Sls => [
-            format!("Layers of {layer} mm. No supports."),
-            "Turn compensation of holes off: gaps are made for your printer's tolerance already.".into(),
+            format!("Layer height {layer} mm. No supports."),
+            "Turn off hole compensation: the gaps already allow for your printer's tolerance.".into(),
         ],
     };
     let mut all = vec![
-        "Open plates.3mf (or a plate of its own). Do not scale it, and do not turn pieces: they lie as they \
-         print best."
+        "Open plates.3mf, or a single plate if there are several. Do not scale or rotate the pieces: they \
+         are already oriented for printing."
             .to_owned(),
     ];
     all.extend(own);
@@ -71,15 +71,15 @@ fn settings(printer: &Printer) -> Vec<String> {
 
 fn file_list(n_plates: usize, n_pieces: usize, has_booklet: bool) -> Vec<(String, String)> {
     let file = |name: String, what: &str| (name, what.to_owned());
-    let mut files = vec![file("plates.3mf".into(), "all plates")];
+    let mut files = vec![file("plates.3mf".into(), "all plates in one file")];
     if n_plates > 1 {
-        files.extend((1..=n_plates).map(|i| file(format!("plates/plate-{i}.3mf"), "one plate")));
+        files.extend((1..=n_plates).map(|i| file(format!("plates/plate-{i}.3mf"), "a single plate")));
     }
     if has_booklet {
-        files.push(file("instructions.pdf".into(), "the booklet, to print"));
+        files.push(file("instructions.pdf".into(), "the booklet for printing"));
     }
-    files.push(file("assembly.3mf".into(), "all pieces in place"));
-    files.extend((0..n_pieces).map(|i| file(piece_file(PatchId::from(i)), "one piece")));
+    files.push(file("assembly.3mf".into(), "all pieces, assembled"));
+    files.extend((0..n_pieces).map(|i| file(piece_file(PatchId::from(i)), "a single piece")));
     files
 }
 
@@ -105,8 +105,8 @@ pub fn failure_section() -> Section {
     Section {
         title: "Do not print this kit".into(),
         lines: vec![
-            "It failed its checks: pieces would come loose, rub or rattle. The page (report.html) says \
-             which and where."
+            "This kit failed its checks: some pieces would come loose, rub or rattle. The report \
+             (report.html) shows which pieces and where."
                 .into(),
         ],
     }
@@ -116,16 +116,16 @@ pub fn failure_section() -> Section {
 pub fn after(has_passed: bool) -> Vec<Section> {
     let apart = section(taking_apart());
     let worth = if has_passed {
-        "What it bears and how far pieces can be wiggled is computed, not tried on a print; printers differ. \
-         Handle it as what it is: a hollow thing held by small connectors. No warranty of any kind comes \
-         with it."
+        "The loads that this kit can take and the play of its pieces were computed, not measured on a print. \
+         Printers differ. Handle it with care: it is a hollow object held together by small connectors. It \
+         comes without warranty of any kind."
     } else {
-        "This kit failed its checks and is not meant to be printed."
+        "This kit failed its checks. Do not print it."
     };
     apart
         .into_iter()
         .chain([Section {
-            title: "What all this is worth".into(),
+            title: "Limits of the computed figures".into(),
             lines: vec![worth.into()],
         }])
         .collect()
@@ -140,10 +140,10 @@ fn section(part: ReportPart) -> Option<Section> {
 
 fn taking_apart() -> ReportPart {
     ReportPart::Text(
-        "Taking it apart".into(),
+        "Disassembly".into(),
         vec![
-            "The key goes out first, the way it came in; then the pieces from the last to the first. No \
-             other piece comes out before."
+            "Pull the key out first, back the way it went in. Then remove the other pieces, from the last to \
+             the first. No other piece comes out before the key."
                 .into(),
         ],
     )
@@ -153,17 +153,17 @@ fn taking_apart() -> ReportPart {
 pub fn care(printer: &Printer) -> ReportTab {
     let clean: Vec<&str> = match printer.process {
         Process::Sla => vec![
-            "Take supports off before the resin is hard, then wash twice. Blow channels and grooves dry: \
-             what stays in them is felt as too tight.",
-            "Let it dry, then harden every side. Sand stubs of supports on seams flat.",
+            "Remove the supports before the final cure, then wash twice. Blow channels and grooves dry: \
+             resin left in them makes the fit too tight.",
+            "Let the pieces dry, then cure them from all sides. Sand support marks on seams flat.",
         ],
         Process::Fdm => vec![
-            "Take supports off. Scrape a first layer that stands out at seams with a blade.",
-            "Pull strings out of channels; a file of 2 mm goes into all of them.",
+            "Remove the supports. If the first layer bulges at a seam, trim it with a blade.",
+            "Pull strings out of the channels. A 2 mm file fits into all of them.",
         ],
         Process::Sls => vec![
             "Brush and blow all powder out of channels and grooves.",
-            "Dyeing adds no thickness; paint does: keep it off seams.",
+            "Dye adds no thickness. Paint does: keep it off seams.",
         ],
     };
     let text = |title: &str, lines: &[&str]| {
@@ -174,27 +174,29 @@ pub fn care(printer: &Printer) -> ReportTab {
         parts: vec![
             text("Clean", &clean),
             text(
-                "Before all: the fit test",
+                "First: the fit test",
                 &[
-                    "`shellock coupon` makes a plate of half an hour that tells which clearance fits on \
-                     your printer. Print it once before a large kit.",
+                    "The fit test is a small plate that prints in about half an hour. It shows which \
+                     clearance your printer needs. Make it with `shellock coupon`, and print it once before \
+                     a large kit.",
                 ],
             ),
             text(
                 "Too tight",
                 &[
-                    "Do not force it: find where it rubs, mostly a stub of a support or a first layer, and \
-                     sand that.",
-                    "If all seams are tight, wet sand channels, or make the kit again with a larger \
-                     --clearance and --seam-gap, 0.03 mm at a time.",
+                    "Do not force it. Find the spot that rubs, usually a support mark or a bulging first \
+                     layer, and sand it.",
+                    "If all seams are tight, wet-sand the channels, or make the kit again with a larger \
+                     clearance and a larger seam gap. Increase both by 0.03 mm at a time.",
                 ],
             ),
             text(
                 "Too loose",
                 &[
-                    "Some play is meant: the Play page shows how much. A key that falls out is held by a \
-                     strip of tape inside its groove.",
-                    "If all pieces rattle, make the kit again with a smaller --clearance, 0.03 mm at a time.",
+                    "Some play is intended: the report (report.html) shows how much. If the key falls out, \
+                     stick a strip of tape inside its groove.",
+                    "If all pieces rattle, make the kit again with a smaller clearance. Reduce it by 0.03 mm \
+                     at a time.",
                 ],
             ),
             taking_apart(),

@@ -26,13 +26,13 @@ pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) ->
     let hollow = 100.0 * (1.0 - strength.solid_share());
     // Where little is hollow, the stress was computed on little of the surface.
     let judged = if hollow < 80.0 {
-        format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
+        format!(" (judged on the {hollow:.0} % of the surface that is hollow)")
     } else {
         String::new()
     };
     format!(
-        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the \
-         material bears ({})",
+        "in a fall from {drop_m} m, the stress in the wall{judged} reaches {:.0} MPa; the material's \
+         strength is {:.0} MPa ({})",
         strength.stress_mpa,
         material.strength_mpa,
         standing.words(strength.at.to_array())
@@ -54,7 +54,7 @@ pub fn quality(proof: &PlanProof) -> String {
     let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
     let chosen = match least_cost < cost {
         true => {
-            format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is")
+            format!("{cost:.3}; this plan holds better than the one of least cost, {least_cost:.3}, which is")
         }
         false => format!("{cost:.3},"),
     };
@@ -68,7 +68,7 @@ pub fn quality(proof: &PlanProof) -> String {
     };
     let percent = 100.0 * gap;
     format!(
-        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} \
+        "plan: its worst piece costs {chosen}{of_key} no plan with {scope} costs less than {lower_bound:.3} \
          ({percent:.1} % below)"
     )
 }
@@ -95,8 +95,8 @@ pub fn scope(proof: &PlanProof) -> String {
     };
     let lessons = match n_lessons {
         0 => String::new(),
-        1 => ", and what one lesson of failed kits leaves".into(),
-        n => format!(", and what {n} lessons of failed kits leave"),
+        1 => ", under one constraint learned from failed kits".into(),
+        n => format!(", under {n} constraints learned from failed kits"),
     };
     format!("{who}, sliding {how}{lessons}")
 }
@@ -128,15 +128,16 @@ pub fn fits(made: &Design) -> Option<String> {
     let as_drawn = |piece| made.kit.play.estimates[piece].map_or(f64::INFINITY, |play| play.translation_mm);
     let thin = match made.fit.loosest {
         Some((piece, play)) if play.translation_mm.is_finite() => format!(
-            "; where all stand back by as much, piece {piece} rattles about {:.1} mm instead of {:.1} mm",
+            "; if all are undersize by as much, piece {piece} has about {:.1} mm of play instead of {:.1} \
+             mm",
             play.translation_mm,
             as_drawn(piece)
         ),
-        Some((piece, _)) => format!("; where all stand back by as much, piece {piece} comes loose"),
+        Some((piece, _)) => format!("; if all are undersize by as much, piece {piece} comes loose"),
         None => String::new(),
     };
     Some(format!(
-        "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is \
+        "fits together if printed faces are oversize by {within_mm:.2} mm at most (the smallest gap is \
          {least_mm:.2} mm){thin}"
     ))
 }

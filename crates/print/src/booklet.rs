@@ -221,10 +221,7 @@ impl Booklet<'_> {
         let mut page = Page::new(fonts);
         let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
         page.text_within([RIM_MM, 30.0], room_mm, bold(11.0, INK), &self.title);
-        let seen = format!(
-            "in these pictures it is seen from {}",
-            side(-Camera::front().direction)
-        );
+        let seen = format!("the pictures show it from {}", side(-Camera::front().direction));
         let lines: Vec<&String> = self.lines.iter().chain([&seen]).collect();
         for (i, line) in lines.iter().enumerate() {
             page.text_within(
@@ -280,7 +277,7 @@ fn pieces_pages<'f>(drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> 
     while cells.peek().is_some() {
         let mut page = start_page(
             "Pieces",
-            "each carries its number on its inner side; they go in by number",
+            "each piece has its number on its inner side; assemble them in this order",
             fonts,
         );
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
@@ -305,8 +302,8 @@ fn pieces_pages<'f>(drawn: &[Drawn<'_>], fonts: &'f Fonts<'f>) -> Vec<Page<'f>> 
 /// Caption of a piece that has a special role: the first one or the key.
 fn role(piece: &ReportPiece<'_>) -> Option<&'static str> {
     match (piece.order, piece.is_key) {
-        (0, _) => Some("the first"),
-        (_, true) => Some("the key, the last"),
+        (0, _) => Some("first"),
+        (_, true) => Some("the key, last"),
         _ => None,
     }
 }
@@ -402,7 +399,7 @@ fn other_view(page: &mut Page<'_>, [x, y]: [f64; 2], sight: &Sight, picture: Ima
     let top = y + 20.0 + height - OTHER_MM;
     page.picture([x + 2.0 + width - OTHER_MM, top], OTHER_MM, picture);
     let room_mm = width - OTHER_MM - 4.0;
-    let words = format!("its place, seen from {}", view::side(-direction));
+    let words = format!("where it goes, seen from {}", view::side(-direction));
     for (k, line) in wrap(page.fonts(), &words, small(FAINT), room_mm)
         .iter()
         .enumerate()
@@ -444,8 +441,8 @@ fn step_heading(page: &mut Page<'_>, [x, y]: [f64; 2], piece: &ReportPiece<'_>, 
 fn what_to_do(piece: &ReportPiece<'_>, i: usize) -> String {
     let from = view::side(-Vec3::from(piece.installation_direction));
     match (i, piece.is_key) {
-        (0, _) => "begin with this piece".to_owned(),
-        (_, true) => format!("the key, from {from}: it locks all"),
+        (0, _) => "start with this piece".to_owned(),
+        (_, true) => format!("the key, from {from}: it locks all pieces"),
         _ => format!("from {from}"),
     }
 }
@@ -454,7 +451,14 @@ fn what_to_do(piece: &ReportPiece<'_>, i: usize) -> String {
 fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     let seen = format!("seen from {}", view::side(-sights[i].direction));
     let is_new = i > 0 && sights[i].direction != sights[i - 1].direction;
-    (if is_new { format!("turn it: {seen}") } else { seen }, is_new)
+    (
+        if is_new {
+            format!("turn the model: {seen}")
+        } else {
+            seen
+        },
+        is_new,
+    )
 }
 
 fn finish_heading(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
@@ -462,7 +466,7 @@ fn finish_heading(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     page.text([x + 1.0, y + 6.6], bold(5.0, INK), "done");
     if let Some(key) = drawn.last() {
         let how = format!(
-            "to take it apart, pull piece {} out first, against its arrow",
+            "to take the model apart, pull piece {} out first, against its arrow",
             key.piece.number
         );
         page.text_within([x + 1.0, y + 11.4], room_mm, small(FAINT), &how);

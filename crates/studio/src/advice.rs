@@ -11,7 +11,7 @@ pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
     match warning.cause() {
         Some(Cause::LabelSplit { label, area_mm2 }) => {
             let cm2 = area_mm2 / 100.0;
-            format!("piece {label} is in parts that do not touch: {cm2:.1} cm² will be a piece of their own")
+            format!("piece {label} has parts that do not touch: {cm2:.1} cm² will become a separate piece")
         }
         Some(Cause::LabelIslands { n: 1, .. }) => "a small island will join the piece around it".to_owned(),
         Some(Cause::LabelIslands { n, .. }) => format!("{n} small islands will join the pieces around them"),
@@ -21,22 +21,25 @@ pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
             least_mm2,
             ..
         }) => format!(
-            "piece {label} is too small ({area_mm2:.0} mm², at least {least_mm2} are needed) and will join \
-             its neighbour"
+            "piece {label} is too small ({area_mm2:.0} mm², at least {least_mm2} mm² is needed) and will \
+             join its neighbour"
         ),
         Some(Cause::LabelsDivided { into }) => {
-            let line = |(label, pieces): &(i64, Vec<PatchId>)| format!("piece {label} in {}", pieces.len());
+            let line = |(label, pieces): &(i64, Vec<PatchId>)| format!("piece {label} into {}", pieces.len());
             let all: Vec<String> = into.iter().map(line).collect();
             format!(
-                "will be divided so that it locks and can be put on: {}; no piece may hold others alone, or \
-                 run around a limb",
+                "pieces will be divided so that the kit locks and can be assembled: {}; no piece may hold \
+                 others alone or run around a limb",
                 all.join(", ")
             )
         }
         Some(Cause::LabelsJoined { labels }) => {
             let labels: Vec<String> = labels.iter().map(ToString::to_string).collect();
             let all = labels.join(", ");
-            format!("pieces {all} will be one: the seams between or around them are too short to hold two")
+            format!(
+                "pieces {all} will be joined into one: the seams between or around them are too short to \
+                 hold separate pieces"
+            )
         }
         _ => {
             let mut pieces: Vec<PatchId> = warning.pieces.iter().map(|&p| PatchId(number(p))).collect();
@@ -49,7 +52,7 @@ pub fn words(warning: &Warning, number: impl Fn(PatchId) -> u32) -> String {
     }
 }
 
-/// Returns true if "Mend" makes the change that `warning` announces.
+/// Returns true if "Fix" makes the change that `warning` announces.
 pub fn is_mended(warning: &Warning) -> bool {
     matches!(
         warning.cause(),

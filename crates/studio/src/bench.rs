@@ -274,7 +274,7 @@ impl Snapshot {
     fn pieces(&self) -> Result<&Pieces, Refusal> {
         self.pieces
             .as_ref()
-            .ok_or_else(|| Refusal::not_found("the model is not divided yet"))
+            .ok_or_else(|| Refusal::not_found("the model has not been divided yet"))
     }
 }
 
@@ -423,7 +423,7 @@ impl Bench {
         if numbers.len() != of.figure.n_faces() || !rest.is_empty() {
             let n = of.figure.n_faces();
             return Err(Refusal::wrong(format!(
-                "{} bytes are no labels of {n} triangles",
+                "{} bytes are not the labels of {n} triangles",
                 labels.len()
             )));
         }
@@ -501,8 +501,7 @@ impl Bench {
         let params = check_options(&of.options).map_err(|e| self.refuse(&e))?;
         let params = Settings::resolve(&params).segmentation;
         let labels = segmentation::mirrored_labels(&params, &of.figure.model.solid, &of.pieces()?.labels);
-        let labels =
-            labels.ok_or_else(|| Refusal::wrong("the model is not the same on both sides of any plane"))?;
+        let labels = labels.ok_or_else(|| Refusal::wrong("the model has no plane of symmetry"))?;
         self.set_pieces(of.revision, Pieces::painted_by_hand(labels))
     }
 

@@ -22,7 +22,7 @@ const ENDING: &str = "-fine.ply";
 /// Note on a refined model, for the page; `None` for other files.
 pub fn note(file: &str) -> Option<String> {
     file.ends_with(ENDING).then(|| {
-        "its triangles were large and are divided, so that they can be painted on; its shape is the same"
+        "its large triangles were subdivided so that they can be painted on; its shape is unchanged"
             .to_owned()
     })
 }

@@ -90,12 +90,16 @@ pub async fn guard(State(studio): State<Studio>, request: Request, next: Next) -
 fn refusal(studio: &Studio, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
     if !is_own(&studio.address, headers.get(header::HOST), "") {
-        return Some(Refusal::stranger("this server answers to 127.0.0.1 only"));
+        return Some(Refusal::stranger(
+            "this server accepts requests to 127.0.0.1 only",
+        ));
     }
     if headers.contains_key(header::ORIGIN)
         && !is_own(&studio.address, headers.get(header::ORIGIN), "http://")
     {
-        return Some(Refusal::stranger("this server answers to its own page only"));
+        return Some(Refusal::stranger(
+            "this server accepts requests from its own page only",
+        ));
     }
     if !studio.rate.admits() {
         return Some(Refusal::too_many());

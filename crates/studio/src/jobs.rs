@@ -307,7 +307,7 @@ impl Job {
             let told = serde_json::from_str::<Value>(&ended.output).ok();
             let told = told.and_then(|value| value["error"].as_str().map(str::to_owned));
             let words = || match ended.errors.join("\n").trim() {
-                "" => "the program ended without a word".to_owned(),
+                "" => "the program ended without a message".to_owned(),
                 errors => errors.to_owned(),
             };
             self.error = Some(told.unwrap_or_else(words));

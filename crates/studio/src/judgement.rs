@@ -1,4 +1,4 @@
-//! Judgement of pieces before they are made: whether they lock, which block others, what "Mend" would change,
+//! Judgement of pieces before they are made: whether they lock, which block others, what "Fix" would change,
 //! and where a key can be.
 
 use shellock::design::{Verdict, outlook};
@@ -149,7 +149,7 @@ impl View<'_> {
                 };
                 Judgement {
                     locks: true,
-                    words: format!("It locks: {} pieces, the key is {key}.", surface.n_patches),
+                    words: format!("The kit locks: {} pieces, the key is {key}.", surface.n_patches),
                     order,
                     ways: ways.map(|way| self.at(way.to_array())).collect(),
                     ..blank
@@ -162,7 +162,7 @@ impl View<'_> {
             } => {
                 let labels = self.labels(surface);
                 Judgement {
-                    words: format!("It does not lock yet: {reason}"),
+                    words: format!("The kit does not lock yet: {reason}"),
                     blockers: blockers.iter().map(|b| self.blocker(b, &labels)).collect(),
                     ..blank
                 }
@@ -177,9 +177,7 @@ impl View<'_> {
         Blocker {
             piece,
             by,
-            words: format!(
-                "piece {by} is in the way of piece {piece} ({place}): it hides {share:.0} % of it"
-            ),
+            words: format!("piece {by} blocks piece {piece} ({place}): it covers {share:.0} % of it"),
             at: self.at(blocker.at),
         }
     }
@@ -287,7 +285,8 @@ fn told_pieces(
         let n_neighbours = neighbours[piece as usize];
         if n_neighbours == 1 {
             let words = format!(
-                "piece {} touches one piece only: it will be joined or held by another",
+                "piece {} touches only one other piece: it will be joined to that piece, or held by a new \
+                 one",
                 piece + 1
             );
             say(Severity::Note, words);

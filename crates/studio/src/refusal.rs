@@ -35,7 +35,7 @@ impl Refusal {
     /// Answer to a request that a later one has superseded. This is nobody's fault, so the status is that of
     /// success and the answer is `{"overtaken": true}`; the page asks again.
     pub fn overtaken() -> Self {
-        Self::new(StatusCode::OK, "the pieces have changed meanwhile")
+        Self::new(StatusCode::OK, "the pieces have changed in the meantime")
     }
 
     /// Refusal due to the machine, such as a full disk.
@@ -48,12 +48,15 @@ impl Refusal {
     }
 
     pub(crate) fn no_token() -> Self {
-        let words = "this needs the token of the address that `shellock studio` printed";
+        let words = "this needs the token in the address that `shellock studio` printed";
         Self::new(StatusCode::UNAUTHORIZED, words)
     }
 
     pub(crate) fn too_large() -> Self {
-        let words = format!("files of more than {} MB are not taken", crate::MOST_BYTES >> 20);
+        let words = format!(
+            "files larger than {} MB are not accepted",
+            crate::MOST_BYTES >> 20
+        );
         Self::new(StatusCode::PAYLOAD_TOO_LARGE, words)
     }
 

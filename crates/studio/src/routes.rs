@@ -68,7 +68,7 @@ pub fn app(address: &Address, jobs: Arc<Jobs>, bench: Arc<Bench>) -> Router {
         .route("/api/events", get(events))
         .route("/api/kit.zip", get(archive))
         .route("/kit/{token}/{*name}", get(kit_file))
-        .fallback(async || Refusal::not_found("there is no such thing here"))
+        .fallback(async || Refusal::not_found("there is nothing at this address"))
         .layer(DefaultBodyLimit::max(MOST_OTHER_BYTES))
         .layer(from_fn_with_state(studio.clone(), guard))
         .with_state(studio)
@@ -83,7 +83,7 @@ async fn apart<T: Send + 'static>(
     let done = tokio::task::spawn_blocking(move || work(&bench)).await;
     done.unwrap_or_else(|_| {
         Err(Refusal::unable(
-            "the program made a mistake there; what you did before is kept",
+            "the program failed at this step; your earlier work is kept",
         ))
     })
 }
@@ -133,14 +133,14 @@ async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Bo
 
 /// Stores the body as a temporary file in the project's folder, deleted when dropped.
 async fn store_body(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Refusal> {
-    let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be kept: {e}"));
+    let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be saved: {e}"));
     let mut file = tempfile::Builder::new()
         .prefix(".upload-")
         .tempfile_in(studio.bench.folder())
         .map_err(unwritable)?;
     let (mut chunks, mut n_bytes) = (body.into_data_stream(), 0);
     while let Some(chunk) = chunks.next().await {
-        let chunk = chunk.map_err(|_| Refusal::wrong("the file did not come whole"))?;
+        let chunk = chunk.map_err(|_| Refusal::wrong("the file did not arrive completely"))?;
         n_bytes += chunk.len() as u64;
         if n_bytes > MOST_BYTES {
             return Err(Refusal::too_large());

@@ -234,7 +234,7 @@ fn labels_in(path: &Path) -> Result<(Vec<i64>, Numbering), Failure> {
     let n_labels = numbering.places.len();
     if n_labels > N_LABELS as usize {
         return Err(Failure::Wrong(format!(
-            "{}: {n_labels} labels, but at most {MOST_PIECES} pieces can be made: give faces of one piece \
+            "{}: {n_labels} labels, but at most {MOST_PIECES} pieces can be made: give all faces of a piece \
              the same label",
             path.display(),
         )));

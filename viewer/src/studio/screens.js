@@ -83,7 +83,7 @@ function pieceList({ pieces, piece, judged }, act) {
     const b = button("", () => act.chose(k));
     b.setAttribute("aria-pressed", String(k === piece));
     const place = judged?.order?.indexOf(k) ?? -1;
-    b.title = `${words.pieces.area(area)}${place >= 0 ? `, goes in as number ${place + 1}` : ""}`;
+    b.title = `${words.pieces.area(area)}${place >= 0 ? `, number ${place + 1} in the order of assembly` : ""}`;
     const swatch = element("i");
     swatch.style.background = css(k);
     b.append(swatch, element("span", "", String(k + 1)));

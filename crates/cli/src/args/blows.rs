@@ -25,19 +25,19 @@ pub struct Blows {
     /// Material of the pieces: sla-resin, pla, petg or pa12 [default: as the kit was built]
     #[arg(long, value_name = "NAME", value_parser = material)]
     pub material: Option<Material>,
-    /// Edge of the cells that finished pieces are cut into, mm, 0.5 to 20; smaller ones take longer and more
-    /// memory
+    /// Edge length of the cells that finished pieces are cut into, mm, 0.5 to 20; smaller cells take more
+    /// time and memory
     #[arg(long, value_name = "MM", default_value_t = 2.5)]
     pub cell: f64,
     /// Compare the kit's plan with connectors of half the size and with a plan of half the score, as walls
     /// and connectors without gaps
     #[arg(long)]
     pub compare: bool,
-    /// Length of the edges of the mesh that forces act on, and of the comparison's, as a share of the usual
-    /// one, 0.2 to 5
+    /// Edge length of the meshes for the forces and for the comparison, as a multiple of the default, 0.2 to
+    /// 5
     #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
     pub edges: f64,
-    /// Which axis points up [default: as the kit was built]
+    /// Axis that points up [default: as the kit was built]
     #[arg(long, value_parser = words::<Axis>())]
     pub up: Option<Axis>,
 }

@@ -85,8 +85,8 @@ fn config() -> Arg {
         .help_heading("Printer")
         .help("Options and printers, in TOML")
         .long_help(
-            "Options and printers, in TOML\n\nOptions and printers, in TOML; what is said on the command \
-             line goes before it [default: shellock.toml, if there is one here]",
+            "Options and printers, in TOML\n\nOptions and printers, in TOML; the command line takes \
+             precedence [default: shellock.toml, if there is one here]",
         )
 }
 

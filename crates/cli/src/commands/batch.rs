@@ -33,7 +33,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     check_options(&options.options.options)?;
     if options.options.options.labels.is_some() {
         return Err(Failure::Wrong(
-            "--labels is of one model; in a batch labels come from the models' files".to_owned(),
+            "--labels belongs to one model; in a batch, labels come from the models' files".to_owned(),
         ));
     }
     if options.memory.is_some_and(f64::is_nan) {
@@ -42,7 +42,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     let models = models(&options.folder, Some(&options.out))?;
     if models.is_empty() {
         return Err(Failure::Wrong(format!(
-            "{} holds no model: names end in {}",
+            "{} contains no model: names end in {}",
             options.folder.display(),
             ENDINGS.join(", ")
         )));
@@ -157,8 +157,7 @@ impl<'a> Shop<'a> {
             Shown::Events => eprintln!("{}", json!({ "event": "again", "model": model })),
             Shown::ForPeople => {
                 println!(
-                    "{model}: the time was over before a kit passed; made again alone when all others are \
-                     there"
+                    "{model}: the time ran out before a kit passed; it is made again alone after all others"
                 );
             }
         }

@@ -76,7 +76,7 @@ fn destination(out: Option<&Path>, force: bool) -> Result<[PathBuf; 2], Failure>
         if file.exists() && !force {
             return refuse(
                 file,
-                "is there already; choose another name with -o, or --force to replace it",
+                "already exists; choose another name with -o, or --force to replace it",
             );
         }
     }
@@ -100,7 +100,7 @@ impl<'a> Plate<'a> {
         let room = [width - 2.0 * EDGE_MM, depth - 2.0 * EDGE_MM, height];
         if size_mm.iter().zip(room).any(|(size, room)| *size > room) {
             return Err(Failure::Wrong(format!(
-                "the fit test needs {:.0} × {:.0} × {:.0} mm and {EDGE_MM} mm around it, more than the \
+                "the fit test needs {:.0} × {:.0} × {:.0} mm and a margin of {EDGE_MM} mm, more than the \
                  printer \"{}\" has ({width} × {depth} × {height} mm)",
                 size_mm[0].ceil(),
                 size_mm[1].ceil(),
@@ -184,7 +184,7 @@ impl<'a> Plate<'a> {
             files[0].display(),
             self.parts.len()
         );
-        println!("{}: the same as one mesh", files[1].display());
+        println!("{}: the same plate as one mesh", files[1].display());
         println!("number  clearance  on rails  tolerance, mm");
         for fit in self.fits {
             println!(
@@ -193,9 +193,9 @@ impl<'a> Plate<'a> {
             );
         }
         println!(
-            "print it as it lies, without supports; the least number whose pin and key go in by hand is \
-             yours. Keep it, where it is 2 for example, with:\n  shellock coupon --printer {} --fits 2 \
-             --save workshop",
+            "print it as it lies, without supports. Use the smallest number whose pin and key go in by hand. \
+             If that is 2, for example, save it with:\n  shellock coupon --printer {} --fits 2 --save \
+             workshop",
             quote(name)
         );
     }
@@ -334,8 +334,8 @@ fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<Str
             return Ok(key);
         }
         return Err(format!(
-            "the printer \"{key}\" is there already and is like \"{like}\", not \"{}\"; name the printer \
-             that the plate was made for with --printer, or choose another name with --save",
+            "the printer \"{key}\" already exists and is like \"{like}\", not \"{}\"; name the printer that \
+             the plate was made for with --printer, or choose another name with --save",
             base.name
         ));
     }

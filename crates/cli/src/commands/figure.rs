@@ -21,7 +21,7 @@ pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Re
     let (solid, limbs) = input::shellock_figure(name, size_mm)?;
     if labels.is_some() && limbs.iter().all(|limb| *limb == 0) {
         return Err(Failure::Wrong(format!(
-            "{name} is not made of limbs, so it has no labels; fish and arms have"
+            "{name} has no limbs and so no labels; fish and arms have labels"
         )));
     }
     if labels.is_some_and(|labels| same_file(labels, out)) {

@@ -17,7 +17,7 @@ use shellock_job::{Failure, Options};
 use shellock_kit::plan_file::RepairEntry;
 
 use crate::Session;
-use crate::print::print_warnings;
+use crate::print::{print_warnings, sentence};
 use crate::progress::Display;
 
 /// Extent of the questions about a model.
@@ -38,7 +38,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
     if !session.is_json {
         print_file(&loaded, &found);
     }
-    let (model, thin) = session.job.during("looking for what is wrong", || {
+    let (model, thin) = session.job.during("checking the surface", || {
         let model = model_of(file, &loaded, &bytes, options);
         let thin = model
             .as_ref()
@@ -87,7 +87,7 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
         unit(loaded)
     );
     println!(
-        "{} open edges, {} edges of more than two faces",
+        "{} open edges, {} edges shared by more than two faces",
         found.edges.open.count, found.edges.non_manifold.count
     );
     let objects = objects(loaded);
@@ -95,7 +95,7 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
         println!("objects {}", list_names(&objects));
     }
     if !loaded.labellings.is_empty() {
-        println!("divided by {}", labellings(loaded).join(", "));
+        println!("can be divided by {}", labellings(loaded).join(", "));
     }
 }
 
@@ -115,7 +115,7 @@ fn print_model(
     model
         .warnings
         .iter()
-        .for_each(|warning| println!("warning: {warning}"));
+        .for_each(|warning| println!("warning: {}", sentence(warning)));
     thin.iter().for_each(|warning| println!("warning: {warning}"));
     let made = model.solid.mesh().bounds().size();
     let state = if model.repairs.is_empty() {

@@ -23,7 +23,7 @@ fn print(savings: &Savings) {
     let wall_mm = savings.wall_mm.unwrap_or_default();
     println!("{} pieces, walls {wall_mm:.2} mm", savings.pieces);
     println!(
-        "material    {:5.1} % of the solid model's",
+        "material    {:5.1} % of the solid model",
         100.0 * savings.volume_ratio
     );
     for (name, time) in &savings.print_time {
@@ -41,7 +41,7 @@ fn print(savings: &Savings) {
         );
         if let (Some(ratio), Some(seconds)) = (time.filled_ratio, time.filled_solid_s) {
             println!(
-                "      {:5.1} % of {:.1} h where the whole model is filled to 100 %",
+                "      {:5.1} % of the {:.1} h that the whole model takes at 100 % infill",
                 100.0 * ratio,
                 hours(seconds)
             );

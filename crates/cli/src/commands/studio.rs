@@ -37,7 +37,7 @@ pub fn studio(session: &Session, options: &StudioOptions) -> Result<u8, Failure>
     };
     shellock_studio::serve(bench, options.port, &session.job.stop, ready).map_err(|e| {
         Failure::Wrong(format!(
-            "the studio cannot begin at port {}: {e}; choose another with --port",
+            "the studio cannot start at port {}: {e}; choose another with --port",
             options.port
         ))
     })?;

@@ -42,7 +42,7 @@ fn run(ctx: &Ctx<'_>, test: &StressTest, compares: bool) -> Result<StressReport,
 
 fn print_table(params: &StressParams, tested: &StressReport) {
     println!(
-        "pieces weigh {:.0} g; punch {:.0} N, fall from {:.2} m; material bears {} MPa",
+        "pieces weigh {:.0} g; punch {:.0} N, fall from {:.2} m; material strength {} MPa",
         tested.mass_g,
         params.punch_n,
         params.drop_mm / 1000.0,
@@ -62,16 +62,16 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         return;
     };
     println!(
-        "printed: the finished pieces with their gaps; μ: friction; the others: walls and connectors \
+        "printed: finished pieces with their gaps; μ: coefficient of friction; others: walls and connectors \
          without gaps"
     );
     for (name, pair) in compared.designs() {
         if let Some(score) = pair.score {
-            println!("{name:16} score, by how many times it bears what people do to it: {score:.2}");
+            println!("{name:16} score (load factor in handling): {score:.2}");
         }
     }
     if compared.half_score.is_none() {
-        println!("no other plan was found, so none of half the score was tested");
+        println!("no other plan was found, so no plan with half the score was tested");
     }
 }
 

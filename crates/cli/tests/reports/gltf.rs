@@ -243,7 +243,7 @@ fn sizes() -> Vec<Case> {
             Glb::of(&scaled(&body(), Vec3::splat(longest / 60.0))).bytes(),
         )
     };
-    let guess = [Size([150.0, 100.0, 75.0]), Warning("it is made 150 mm")];
+    let guess = [Size([150.0, 100.0, 75.0]), Warning("the model is made 150 mm")];
     vec![
         longest("one_metre.glb", 0.98).says(&guess),
         longest("two_metres.glb", 1.9).says(&guess),

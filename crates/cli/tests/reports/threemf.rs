@@ -189,7 +189,7 @@ fn told() -> Vec<Case> {
         )
         .says(&[WHOLE, Note("another unit than its root")])
         .proves("3MF", "read", "files with units of their own"),
-        Case::new("all_switched_off.3mf", off).says(&[WHOLE, Note("every object is switched off")]),
+        Case::new("all_switched_off.3mf", off).says(&[WHOLE, Note("every object is excluded from printing")]),
     ]
 }
 
@@ -242,13 +242,13 @@ fn types() -> Vec<Case> {
         ),
         typed("type_solidsupport.3mf", "solidsupport"),
         Case::new("only_other.3mf", only)
-            .says(&[Refused("nothing but")])
+            .says(&[Refused("contains only")])
             .proves("3MF", "refused", "files with nothing to print"),
         Case::new(
             "switched_off.3mf",
             plain(&off, &format!("{ITEM}<item objectid=\"2\" printable=\"0\"/>")),
         )
-        .says(&[WHOLE, Note("not to print")])
+        .says(&[WHOLE, Note("excluded from printing")])
         .proves("3MF", "left out", "what is switched off"),
     ]
 }
@@ -351,7 +351,7 @@ fn shared() -> Vec<Case> {
                      value=\"1\"/></part></object><object id=\"4\"><part id=\"1\"><metadata \
                      key=\"extruder\" value=\"2\"/></part></object></config>";
     vec![
-        Case::new("shared_part.3mf", lost).says(&[Size([70.0, 40.0, 30.0]), Note("not to print")]),
+        Case::new("shared_part.3mf", lost).says(&[Size([70.0, 40.0, 30.0]), Note("excluded from printing")]),
         Case::new(
             "shared_two_roles.3mf",
             package(&[(ROOT, &two_roles), ("3D/o.model", &other), (BAMBU, modifier)]),

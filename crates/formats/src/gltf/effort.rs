@@ -23,7 +23,8 @@ impl Effort {
         self.0.set(spent);
         if spent > MAX_STEPS {
             return Err(error(format!(
-                "its skins and morph targets need more than {MAX_STEPS} steps; apply them where it was made"
+                "its skins and morph targets need more than {MAX_STEPS} steps; apply them in the program \
+                 that made it"
             )));
         }
         Ok(())

@@ -53,8 +53,8 @@ pub(super) fn check(required: &[String]) -> Result<(), ReadError> {
                 .take(QUOTED_CHARS)
                 .collect();
             return Err(ReadError::GltfUnsupported {
-                what: format!("needs the extension \"{name}\", which is not read"),
-                remedy: "export it without",
+                what: format!("needs the extension \"{name}\", which is not supported"),
+                remedy: "export it without that extension",
             });
         }
     }

@@ -18,7 +18,7 @@ impl Accessors<'_> {
         if node.skin.is_some() {
             return Err(ReadError::GltfUnsupported {
                 what: format!("has instances of a mesh with a skin (node {id}), which have no defined place"),
-                remedy: "apply the skin or the instances where it was made",
+                remedy: "apply the skin or the instances in the program that made it",
             });
         }
         let mut counts = Vec::new();

@@ -210,9 +210,9 @@ fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
     let n_others = document.scenes.len().saturating_sub(1);
     notes.extend(left_out(n_others, "other scene is", "other scenes are"));
     if !document.animations.is_empty() {
-        notes.push("the file is animated; its pose at rest is used".to_owned());
+        notes.push("the file is animated; its rest pose is used".to_owned());
     } else if !document.skins.is_empty() {
-        notes.push("the file has a skeleton; its pose at rest is used".to_owned());
+        notes.push("the file has a skeleton; its rest pose is used".to_owned());
     }
     if document.extensions.variants.is_some() {
         notes.push("the file has variants of its materials; the default ones are used".to_owned());

@@ -215,14 +215,14 @@ fn read_faces(
 fn label_note(name: &str, labels: Option<&[i64]>) -> Option<String> {
     let Some(labels) = labels else {
         return Some(format!(
-            "the faces have a {name:?}, but not all are whole numbers; it divides nothing"
+            "the faces have a {name:?}, but not all are whole numbers; it cannot define pieces"
         ));
     };
     let n_below = labels.iter().filter(|label| **label < 0).count();
     (n_below > 0).then(|| {
         format!(
-            "{n_below} of {} faces have a {name:?} below 0, as programs mark what has none; they are taken \
-             as a piece of their own, or one for each place",
+            "{n_below} of {} faces have a {name:?} below 0, which means no label in some programs; these \
+             faces become a separate piece, or one piece for each place",
             labels.len()
         )
     })

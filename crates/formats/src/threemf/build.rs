@@ -28,7 +28,7 @@ pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadErr
     }
     if !model.other_units.is_empty() {
         notes.push(format!(
-            "parts of the file in another unit than its root, all brought to the root's: {}",
+            "parts of the file in another unit than its root were converted to the root's unit: {}",
             list_names(&model.other_units)
         ));
     }
@@ -130,13 +130,10 @@ impl<'a> Build<'a> {
         if n_off == 0 {
             None
         } else if n_off == self.model.items.len() {
-            Some(
-                "every object is switched off, so that the slicer would print nothing; all were taken"
-                    .to_owned(),
-            )
+            Some("every object is excluded from printing in the slicer; all were used".to_owned())
         } else {
             Some(format!(
-                "objects that the slicer is not to print: {n_off}; left out"
+                "objects excluded from printing in the slicer: {n_off}; left out"
             ))
         }
     }
@@ -395,19 +392,16 @@ impl Flat {
         }
         if self.n_unnamed > 0 {
             notes.push(format!(
-                "{} triangle(s) have a colour or material that the file does not have; those of the same \
-                 missing one are taken as one",
+                "{} triangle(s) refer to a colour or material that is missing from the file; triangles with \
+                 the same missing one are treated alike",
                 self.n_unnamed
             ));
         }
         if self.has_textures {
-            notes.push("the file's texture is not used: it divides nothing".to_owned());
+            notes.push("the file's texture is not used".to_owned());
         }
         if !self.unknown.is_empty() {
-            notes.push(format!(
-                "elements that are not read: {}",
-                list_names(&self.unknown)
-            ));
+            notes.push(format!("unsupported elements: {}", list_names(&self.unknown)));
         }
         if build.model.objects.is_empty() {
             notes.push("the file has no objects".to_owned());

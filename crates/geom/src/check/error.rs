@@ -13,8 +13,8 @@ pub enum InputError {
     Empty,
     /// Coordinates that are NaN or infinite.
     #[error(
-        "{count} points have a coordinate that is not a number, the first is point {vertex} (from 0); \
-         repair the model where it was made"
+        "{count} points have a coordinate that is not a number, the first is point {vertex} (from 0); repair \
+         the model in the program that made it"
     )]
     NotFinite {
         /// First point with such a coordinate.
@@ -78,8 +78,8 @@ pub enum InputError {
     Bodies(Vec<ClosedPart>),
     /// More open edges than triangles: unconnected triangles, or cracks everywhere.
     #[error(
-        "the triangles do not hang together: {} on {}, first near {}; \
-         their corners do not meet exactly: merge points by distance in a modelling program",
+        "the triangles are not connected: {} on {}, first near {}; their corners do not meet exactly: merge \
+         points by distance in a modelling program",
         plural(*count, "open edge", "open edges"), plural(*n_faces, "triangle", "triangles"), Coordinates(*at)
     )]
     Loose {
@@ -93,8 +93,8 @@ pub enum InputError {
     /// Surface broken by points that were rounded to the same place.
     #[error(
         "{count} of {n_faces} triangles have no size, since their corners are in the same place; the \
-         coordinates were rounded too coarsely: move the model near the origin where it was made and export \
-         it with more digits"
+         coordinates were rounded too coarsely: move the model near the origin in the program that made it \
+         and export it with more digits"
     )]
     Collapsed {
         /// Number of triangles with two equal corners.

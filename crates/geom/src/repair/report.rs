@@ -128,11 +128,11 @@ impl RepairKind {
                 let within = Short(within);
                 format!("{subject} merged with others within {within} across cracks")
             }
-            Self::Copies => format!("{subject} there twice and removed"),
+            Self::Copies => format!("{subject} duplicated and removed"),
             Self::Joined => format!("{subject} in the middle of a neighbour's edge and joined to it"),
-            Self::Turned => format!("{subject} the wrong way and turned"),
+            Self::Turned => format!("{subject} the wrong way and flipped"),
             Self::Closed { widest } => format!("{subject} closed, up to {} wide", Short(widest)),
-            Self::Everted => format!("{subject} inside out and turned"),
+            Self::Everted => format!("{subject} inside out and flipped"),
             Self::CutOut { volume } => {
                 let volume = Short(volume);
                 format!("{subject} inside out left a hole of {volume} in what it overlapped")
@@ -147,7 +147,7 @@ impl RepairKind {
                 )
             }
             Self::Fused => format!("{subject}, some of which touch with their faces, were united"),
-            Self::Parted => format!("the surface touched itself in {subject}; it was parted there"),
+            Self::Parted => format!("the surface touched itself in {subject}; it was separated there"),
             Self::Filled { volume } => {
                 let volume = Short(volume);
                 format!("{subject} inside the body, {volume} in volume, left out: pieces are hollow anyway")

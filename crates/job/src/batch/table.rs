@@ -90,7 +90,7 @@ fn html(records: &[Record]) -> String {
          content=\"width=device-width\"><title>Kits</title><style>{STYLE}</style><h1>{n_verified} of {} \
          models have a kit that passes every \
          check</h1><table><thead><tr><th>Kit<th>Model<th>Status<th>Pieces<th>Seconds<th>Memory, \
-         MB<th>Warnings<th>Said first</thead><tbody>{rows}</tbody></table></html>\n",
+         MB<th>Warnings<th>First message</thead><tbody>{rows}</tbody></table></html>\n",
         records.len()
     )
 }

@@ -66,7 +66,7 @@ pub(super) fn check_size(longest_mm: f64) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Wrong(format!(
-        "the longest side would be {} mm; it must lie between {least} and {most} mm: choose with --size",
+        "the longest side would be {} mm; it must lie between {least} and {most} mm: set it with --size",
         round_length(longest_mm)
     )))
 }
@@ -96,9 +96,10 @@ fn unusual(longest_mm: f64) -> Option<Warning> {
         warning(
             "size-unusual",
             format!(
-                "the file states its unit, by which the longest side is {longest_mm:.1} mm: unusually \
-                 {how}; it is made so (choose another with --size)"
+                "by the file's own unit the longest side is {longest_mm:.1} mm, which is unusually {how}; \
+                 the model is made at that size"
             ),
+            &["size"],
         )
     })
 }
@@ -107,8 +108,8 @@ fn unusual(longest_mm: f64) -> Option<Warning> {
 fn guess(loaded: &Loaded, longest: f64) -> Warning {
     let what = match loaded.unit_mm {
         Some(mm) if is_normalised(loaded.format, longest) => format!(
-            "the longest side is {longest:.3} of the file's units of {mm} mm, as of models that programs \
-             scale to one size"
+            "the longest side is {longest:.3} units of {mm} mm, as in models that a program scaled to a \
+             standard size"
         ),
         Some(mm) => format!(
             "by the file's unit the longest side is {} mm, which is unusual",
@@ -135,24 +136,27 @@ fn guess(loaded: &Loaded, longest: f64) -> Warning {
         .into_iter()
         .map(|(name, mm)| (name, mm * longest))
         .filter(|&(name, size)| fits(name, size))
-        .map(|(name, size)| format!("{size:.0} mm with --unit {name}"))
+        .map(|(name, size)| format!("{size:.0} mm if the unit is {name}"))
         .collect();
     let others = if others.is_empty() {
         String::new()
     } else {
-        format!("; it would be {}", others.join(", "))
+        format!("; its size would be {}", others.join(", "))
     };
     warning(
         "size-guessed",
-        format!(
-            "{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or \
-             --scale)"
-        ),
+        format!("{what}; the model is made {DEFAULT_SIZE_MM} mm long{others}"),
+        &["unit", "size", "height", "scale"],
     )
 }
 
-fn warning(code: &'static str, sentence: String) -> Warning {
-    Warning::new(Cause::Input { code, sentence }, Vec::new(), None)
+fn warning(code: &'static str, sentence: String, settings: &'static [&'static str]) -> Warning {
+    let cause = Cause::Input {
+        code,
+        sentence,
+        settings,
+    };
+    Warning::new(cause, Vec::new(), None)
 }
 
 #[cfg(test)]
@@ -181,14 +185,17 @@ mod tests {
             Some(Cause::Input { sentence, .. }) => sentence.clone(),
             other => panic!("{other:?}"),
         };
-        assert!(told(1500.0).contains("1500 units") && told(1500.0).contains("1500 mm with --unit mm"));
-        assert!(told(15.0).contains("15 mm with --unit mm, 150 mm with --unit cm, 381 mm with --unit inch"));
+        assert!(told(1500.0).contains("1500 units") && told(1500.0).contains("1500 mm if the unit is mm"));
         assert!(
-            told(150_000.0).contains("150 mm with --unit micron"),
+            told(15.0)
+                .contains("15 mm if the unit is mm, 150 mm if the unit is cm, 381 mm if the unit is inch")
+        );
+        assert!(
+            told(150_000.0).contains("150 mm if the unit is micron"),
             "{}",
             told(150_000.0)
         );
-        assert!(!told(1.5).contains("--unit mm"), "{}", told(1.5));
+        assert!(!told(1.5).contains("the unit is mm"), "{}", told(1.5));
     }
 
     #[test]

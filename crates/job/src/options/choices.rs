@@ -158,7 +158,7 @@ pub fn relabel(choices: &[(String, Choice)], new_label: impl Fn(i64) -> Option<i
 
 fn choice(option: &Declared, value: &Value) -> Result<Option<Choice>, Failure> {
     let name = option.name;
-    let wrong = || Failure::Wrong(format!("{name}: this cannot be a value of it: {value}"));
+    let wrong = || Failure::Wrong(format!("{name}: this is not a valid value: {value}"));
     let text = |value: &Value| match value {
         Value::String(text) => Some(text.trim().to_owned()),
         Value::Number(number) => Some(number.to_string()),
@@ -219,7 +219,7 @@ fn take(option: &Declared, choice: &Choice, options: &mut Options) -> Result<(),
         (Choice::On, Kind::Flag(_)) => &[String::new()],
         (Choice::Text(text), _) if option.takes_value() => std::slice::from_ref(text),
         (Choice::Many(texts), _) if option.is_many => texts,
-        _ => return Err(format!("{}: this cannot be a value of it", option.name)),
+        _ => return Err(format!("{}: this is not a valid value", option.name)),
     };
     texts.iter().try_for_each(|text| {
         option

@@ -218,16 +218,14 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "sla, fdm, fdm-petg, sls, or a printer of your own",
-        "Printer that the kit is made for: sla, fdm, fdm-petg, sls, or a printer of the \
-             configuration file; its clearances, walls and material are used where nothing else is \
-             said",
+        "Printer that the kit is made for: sla, fdm, fdm-petg, sls, or a printer from the configuration \
+         file; its clearances, walls and material are the defaults",
     )
     .default("sla"),
     text(SIZE, "size", "MM", |o, t| length_mm(t).map(|v| o.size = Some(v)))
         .help(
-            "Longest side of the made thing",
-            "Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, \
-             else 150]",
+            "Longest side of the kit",
+            "Longest side of the kit, mm [default: the file's own size if that is 20 to 1000, else 150]",
         )
         .with_hyphens()
         .not_with(&["height", "scale"]),
@@ -235,26 +233,26 @@ pub const DECLARED: &[Declared] = &[
         length_mm(t).map(|v| o.height = Some(v))
     })
     .help(
-        "Height of the made thing along --up",
-        "Height of the made thing along --up, mm",
+        "Height of the kit along its up axis",
+        "Height of the kit along its up axis, mm",
     )
     .with_hyphens()
     .not_with(&["scale"]),
     text(SIZE, "scale", "F", |o, t| number(t).map(|v| o.scale = Some(v)))
-        .help("Millimetres a file unit", "Millimetres a file unit")
+        .help("Millimetres per file unit", "Millimetres per file unit")
         .with_hyphens()
         .mark_advanced(),
     choice::<Unit>(SIZE, "unit", "UNIT", |o, t| word(t).map(|v| o.unit = Some(v)))
         .help(
             "Unit of the file: micron, mm, cm, inch, foot or m",
-            "Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that \
+            "Unit of the file's lengths [default: the file's own if it has one, as 3MF does, else mm if that \
              gives a sensible size]",
         )
         .not_with(&["size", "height", "scale"]),
     choice::<Axis>(SIZE, "up", "UP", |o, t| word(t).map(|v| o.up = v))
         .help(
             "Axis of the file that points up: x, y or z",
-            "Which axis of the file points up",
+            "Axis of the file that points up",
         )
         .default("z"),
     text(SURFACE, "object", "NAME", |o, t| {
@@ -262,44 +260,43 @@ pub const DECLARED: &[Declared] = &[
         Ok(())
     })
     .help(
-        "Make one object of the file, by its name",
-        "Which object of the file is made, where it has several: its name, or \"object 2\" where \
-             it has none",
+        "Use one object of the file, by its name",
+        "Object of the file to use, if it has several: its name, or \"object 2\" if it has no name",
     ),
     text(SURFACE, "plate", "N|NAME", |o, t| {
         o.plate = Some(t.to_owned());
         Ok(())
     })
     .help(
-        "Make one plate of a slicer's project",
-        "Which plate of a slicer's project is made, by its number or its name",
+        "Use one plate of a slicer's project",
+        "Plate of a slicer's project to use, by its number or name",
     )
     .mark_advanced(),
     flag(SURFACE, "no-repair", |o| o.no_repair = true)
         .help(
             "Refuse a surface that needs repair",
-            "Refuse a surface that needs repair instead of mending it",
+            "Refuse a surface that needs repair instead of repairing it",
         )
         .mark_advanced()
         .not_with(&["largest"]),
     flag(SURFACE, "largest", |o| o.largest = true).help(
-        "Make only the largest of several bodies",
-        "Make only the largest of several bodies that lie apart from each other",
+        "Use only the largest of several bodies",
+        "Use only the largest of several separate bodies",
     ),
     flag(SURFACE, "fill", |o| o.fill = true)
         .help(
-            "Close a hollow model's openings: it is made solid",
-            "Close the openings of a model that is hollow already, as slicers for resin make it, and \
-             make the solid figure of it",
+            "Close a hollow model's openings and make it solid",
+            "Close the openings of a model that is already hollow, such as one hollowed by a resin slicer, \
+             and use its solid shape",
         )
         .mark_advanced(),
     choice::<InsideOutMeans>(SURFACE, "inside-out", "ask|cut|unite", |o, t| {
         word(t).map(|v| o.inside_out = v)
     })
     .help(
-        "A body inside out that overlaps another: ask, cut or unite",
-        "Meaning of a body that is inside out and overlaps another: ask, the model is refused \
-             and the body's place is named; cut, it is a hole; unite, it is a part",
+        "Inside-out body overlapping another: ask, cut or unite",
+        "Meaning of an inside-out body that overlaps another: ask refuses the model and names the place of \
+         the body; cut makes it a hole; unite makes it a part",
     )
     .default("ask")
     .mark_advanced(),
@@ -307,43 +304,43 @@ pub const DECLARED: &[Declared] = &[
         length_mm(t).map(|v| o.resolution = v)
     })
     .help(
-        "Detail to keep of a surface of very many triangles",
-        "Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: it is \
-             described by fewer, none farther from it than this; 0 keeps all, as `segment` does",
+        "Detail to keep if there are very many triangles",
+        "Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: the surface is \
+         simplified within this distance; 0 keeps all triangles, as `segment` does",
     )
     .default("0.015")
     .with_hyphens()
     .mark_advanced(),
     path(PIECES, "labels", "FILE", |o, path| o.labels = Some(path)).help(
-        "One label a face: a .seg or .ply file",
-        "One label a face: a .seg file (one integer a line) or a .ply with a face property; a \
-             label is a piece",
+        "One label per face: a .seg or .ply file",
+        "One label per face: a .seg file (one integer per line) or a .ply with a face property; each label \
+         is a piece",
     ),
     choice::<LabelsFrom>(PIECES, "labels-from", "WHAT", |o, t| {
         word(t).map(|v| o.labels_from = v)
     })
     .help(
         "Source of the division: labels, paint, colors …",
-        "Data in the model's own file that divide it into pieces",
+        "Data in the model's own file that define the pieces",
     )
     .default("auto")
     .not_with(&["labels"]),
     choice::<Method>(PIECES, "method", "METHOD", |o, t| word(t).map(|v| o.method = v))
         .help(
             "auto, creases, random-cuts, sdf, primitives or kmeans",
-            "How pieces are found where there are no labels: creases, of similar size with seams in \
-             creases; auto, where people would divide, by the best cuts of the others; random-cuts, \
-             the cuts that most of many agree on; sdf, by thickness; primitives, by what planes, \
-             spheres and cylinders fit; kmeans, by distance and turning",
+            "How to find pieces if there are no labels: creases, pieces of similar size with seams in \
+             creases; auto, the best cuts of the other methods, close to where people would cut; \
+             random-cuts, cuts that most of many random divisions share; sdf, by thickness; primitives, by \
+             fitted planes, spheres and cylinders; kmeans, by distance and surface direction",
         )
         .default("auto"),
     text(PIECES, "pieces", "auto|N|fits-bed", |o, t| {
         t.parse().map(|v| o.pieces = v)
     })
     .help(
-        "About how many pieces to make",
-        "About how many pieces to make where there are no labels: auto, what the method finds, \
-             about 10 for a 150 mm figure; a number; or fits-bed, as few as fit the printer",
+        "Approximate number of pieces",
+        "Approximate number of pieces if there are no labels: auto, the number that the method finds, about \
+         10 for a 150 mm figure; a number; or fits-bed, as few as fit the printer",
     )
     .default("auto"),
     choice::<bool>(PIECES, "symmetric", "on|off", |o, t| {
@@ -351,18 +348,16 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Divide both sides of a symmetric model alike",
-        "Whether both sides of a symmetric model are divided alike, where the method is auto or \
-             random-cuts",
+        "Divide both sides of a symmetric model alike, if the method is auto or random-cuts",
     )
     .default("off"),
     text(PIECES, "keep-whole", "X,Y,Z,R|LABEL", |o, t| {
         keep_whole(t).map(|v| o.keep_whole.push(v))
     })
     .help(
-        "A region that no seam divides, such as a face",
-        "A region that no seam is to divide, such as a face: the surface within R mm of a place \
-             in the made thing's space, or what has a label, where there are labels; may be given \
-             several times",
+        "A region without seams, such as a face",
+        "A region that no seam may divide, such as a face: the surface within R mm of a place in the kit's \
+         coordinates, or the faces with a label if there are labels; may be given several times",
     )
     .many()
     .with_hyphens(),
@@ -370,19 +365,18 @@ pub const DECLARED: &[Declared] = &[
         t.parse().map(|v| o.key = v)
     })
     .help(
-        "Goes in last: cut, the flattest piece, or piece N",
-        "What goes in last and can be taken out again: auto, a key on rails that is cut where it \
-             slides best; X,Y,Z, the same near that place in the made thing's space; piece, the \
-             flattest piece that works, as it is; or a piece, by its label or by the number that \
-             `segment` gives it",
+        "The last piece: cut, the flattest piece, or piece N",
+        "The key, which goes in last and can be taken out again: auto, a key on rails, cut where it slides \
+         best; X,Y,Z, the same near that place in the kit's coordinates; piece, the flattest suitable piece, \
+         unchanged; or a piece, by its label or by the number that `segment` gives it",
     )
     .default("auto")
     .with_hyphens(),
     text(PIECES, "time", "SECONDS", |o, t| seconds(t).map(|v| o.time = v))
         .help(
-            "For the whole job; 0: as long as it takes",
-            "Seconds for the whole job: when they are over, the best kit so far is finished; 0 takes \
-             the time it takes",
+            "Limit for the whole job; 0: no limit",
+            "Time limit for the whole job, s: when it is over, the best kit so far is finished; 0 sets no \
+             limit",
         )
         .default("60")
         .with_hyphens(),
@@ -391,8 +385,8 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Work instead of time: the same kit on any machine",
-        "Work for the whole job instead of time, in seconds that it is expected to take on an ordinary \
-             computer of two cores: the kit is the same on any machine",
+        "Limit of work for the whole job instead of time, in the seconds it takes on an ordinary computer \
+         with two cores: the kit is the same on any machine",
     )
     .not_with(&["time"])
     .with_hyphens(),
@@ -401,8 +395,8 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Work spent on proving that no plan is better",
-        "Work spent on proving that no plan is better, in seconds of an ordinary computer; a \
-             slower one ends after twice that",
+        "Work spent on proving that no plan is better, in seconds on an ordinary computer; a slower computer \
+         stops after twice that time",
     )
     .default("10")
     .with_hyphens()
@@ -411,9 +405,9 @@ pub const DECLARED: &[Declared] = &[
         t.parse().map(|v| o.thickness = v)
     })
     .help(
-        "Wall, 0.8 to 10 mm",
-        "Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, \
-             if that is more) to 3 mm that bears a fall",
+        "Wall thickness, 0.8 to 10 mm",
+        "Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times the thinnest wall that \
+         the printer can make, if that is more) to 3 mm that survives a fall",
     )
     .default("auto")
     .with_hyphens(),
@@ -422,13 +416,12 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "sla-resin, pla, petg or pa12 [default: printer's]",
-        "What it is printed of: what it bears decides how thick walls must be [default: the \
-             printer's]",
+        "Print material: its strength decides how thick walls must be [default: the printer's]",
     ),
     text(MAKE, "drop", "HEIGHT", |o, t| metres(t).map(|v| o.drop = v))
         .help(
-            "Fall that walls must bear",
-            "Height of the fall that walls must bear, 0.01 to 20 m",
+            "Fall that walls must survive",
+            "Height of the fall that walls must survive, 0.01 to 20 m",
         )
         .default("1.275")
         .with_hyphens(),
@@ -437,8 +430,8 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Size of connectors, 1.5 to 6 mm",
-        "Connector size: 1.5 to 6 mm for all seams, or \"auto\": 2 to 4 mm, by the stress at \
-             each seam and by what fits",
+        "Connector size: 1.5 to 6 mm for all seams, or \"auto\": 2 to 4 mm, by the stress and the room at \
+         each seam",
     )
     .default("auto")
     .with_hyphens(),
@@ -447,8 +440,8 @@ pub const DECLARED: &[Declared] = &[
     })
     .help(
         "Gap of connectors, mm [default: printer's]",
-        "Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 \
-             to 0.3 for filament [default: the printer's]",
+        "Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for \
+         filament [default: the printer's]",
     )
     .with_hyphens(),
     text(MAKE, "key-clearance", "MM", |o, t| {
@@ -462,8 +455,8 @@ pub const DECLARED: &[Declared] = &[
     .mark_advanced(),
     text(MAKE, "detent", "MM", |o, t| length_mm(t).map(|v| o.detent = v))
         .help(
-            "Bump that the key clicks past, 0 to 0.4 mm",
-            "Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none",
+            "Bump that the key snaps past, 0 to 0.4 mm",
+            "Height of a bump on each rail that the key snaps past, mm, 0 to 0.4; 0 makes none",
         )
         .default("0")
         .with_hyphens()
@@ -472,24 +465,24 @@ pub const DECLARED: &[Declared] = &[
         length_mm(t).map(|v| o.key_ribs = v)
     })
     .help(
-        "How far ribs press on a key without rails, mm",
-        "How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 \
-             makes none",
+        "Interference of ribs on a key without rails, mm",
+        "Interference between ribs on a key without rails and the pieces around it, mm, 0 to 0.3; 0 makes \
+         none",
     )
     .default("0.08")
     .with_hyphens()
     .mark_advanced(),
     flag(MAKE, "play-together", |o| o.play_together = true)
         .help(
-            "Also prove how far pieces move all together",
-            "Also look for a proof of how far pieces move within the gaps while all others but one \
-             move too; closes for small kits only, and takes some seconds to a minute",
+            "Also prove the play of all pieces together",
+            "Also search for a proof of how far each piece can move when all others but one move too; \
+             succeeds for small kits only, and takes from a few seconds to a minute",
         )
         .mark_advanced(),
     flag(MAKE, "allow-thin", |o| o.allow_thin = true).help(
-        "Make pieces though hardly anything can be hollow",
-        "Make pieces though hardly anything of the model can be hollow; they are mostly solid, \
-             with few connectors",
+        "Make pieces even if almost nothing can be hollow",
+        "Make pieces even if almost nothing of the model can be hollow; they are mostly solid, with few \
+         connectors",
     ),
     flag(MAKE, "key-grip", |o| o.key_grip = true).help(
         "Cut a notch for a fingernail into the key",
@@ -500,7 +493,7 @@ pub const DECLARED: &[Declared] = &[
         "Leave the pieces' numbers off their inner sides",
     ),
     choice::<PaperSize>(MAKE, "paper", "a4|letter", |o, t| word(t).map(|v| o.paper = v))
-        .short_help("Paper of the booklet")
+        .short_help("Paper size of the booklet")
         .default("a4"),
     flag(MAKE, "no-booklet", |o| o.no_booklet = true).help(
         "Leave out instructions.pdf",
@@ -510,9 +503,9 @@ pub const DECLARED: &[Declared] = &[
         length_mm(t).map(|v| o.seam_gap = Some(v))
     })
     .help(
-        "How far each side of a seam stays back, mm",
-        "How far each side of a seam stays back, mm, 0 to 0.4; less for those who sand [default: \
-             the printer's tolerance]",
+        "Distance that each side of a seam stays back, mm",
+        "Distance that each side of a seam stays back, mm, 0 to 0.4; use less if you sand the seams \
+         [default: the printer's tolerance]",
     )
     .with_hyphens()
     .mark_advanced()
@@ -521,9 +514,9 @@ pub const DECLARED: &[Declared] = &[
         length_mm(t).map(|v| o.min_wall = Some(v))
     })
     .help(
-        "Thinnest wall that the printer makes, mm",
-        "Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported \
-             [default: the printer's]",
+        "Thinnest wall that the printer can make, mm",
+        "Thinnest wall that the printer can make, mm, 0.1 to 2; thinner parts are reported [default: the \
+         printer's]",
     )
     .with_hyphens()
     .mark_advanced(),

@@ -20,8 +20,9 @@ const LENGTHS: [(&str, f64); 13] = [
 
 /// Parses a length in mm: "150", "15cm", "6in". Its range is checked later.
 pub fn length_mm(text: &str) -> Result<f64, String> {
-    with_unit(text, &LENGTHS)
-        .ok_or_else(|| format!("\"{text}\" is no length; write mm, such as 150, or with a unit: 15cm, 6in"))
+    with_unit(text, &LENGTHS).ok_or_else(|| {
+        format!("\"{text}\" is not a length; write mm, such as 150, or with a unit: 15cm, 6in")
+    })
 }
 
 /// Parses a height in m, above 0: "2m", "200cm", "2000 mm" or "2".
@@ -35,21 +36,21 @@ pub fn metres(text: &str) -> Result<f64, String> {
         ("", 1.0),
     ];
     above_0(with_unit(text, &units))
-        .ok_or_else(|| format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm"))
+        .ok_or_else(|| format!("\"{text}\" is not a height above 0; write for example 2m, 150cm or 500mm"))
 }
 
 /// Parses a force in N, above 0: "70N", "7kg", "0.07 kN" or "70".
 pub fn newtons(text: &str) -> Result<f64, String> {
     let units = [("kn", 1000.0), ("kg", 9.80665), ("n", 1.0), ("", 1.0)];
     above_0(with_unit(text, &units))
-        .ok_or_else(|| format!("\"{text}\" is no force above 0 N; write for example 70N or 7kg"))
+        .ok_or_else(|| format!("\"{text}\" is not a force above 0 N; write for example 70N or 7kg"))
 }
 
 /// Parses a time in s: "90", "90s", "2min".
 pub fn seconds(text: &str) -> Result<f64, String> {
     let units = [("min", 60.0), ("h", 3600.0), ("s", 1.0), ("", 1.0)];
     with_unit(text, &units)
-        .ok_or_else(|| format!("\"{text}\" is no time; write seconds, such as 90, or 2min"))
+        .ok_or_else(|| format!("\"{text}\" is not a time; write seconds, such as 90, or 2min"))
 }
 
 /// Number times the factor of the first unit that the text ends in; `None` if either is missing.

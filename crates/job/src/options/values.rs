@@ -175,7 +175,7 @@ impl InsideOutMeans {
 impl Word for InsideOutMeans {
     fn all() -> Vec<(Self, &'static str, &'static str)> {
         vec![
-            (Self::Ask, "ask", "Nobody knows: the model is refused"),
+            (Self::Ask, "ask", "Unknown: the model is refused"),
             (Self::Cut, "cut", "A hole in the body that it overlaps"),
             (
                 Self::Unite,

@@ -20,7 +20,7 @@ fn wrong(what: String) -> PlanFileError {
 
 fn no_direction(piece: PatchId) -> PlanFileError {
     wrong(format!(
-        "the installation_direction of piece {piece} is no unit vector"
+        "the installation_direction of piece {piece} is not a unit vector"
     ))
 }
 
@@ -35,7 +35,7 @@ impl PlanFile {
             let number = i + 1;
             if usize::from(piece.id) != i {
                 return Err(wrong(format!(
-                    "the piece at place {number} does not have the id {number}"
+                    "the piece at position {number} does not have the id {number}"
                 )));
             }
             let out = Direction::of(-Vec3::from(piece.installation_direction));
@@ -46,7 +46,7 @@ impl PlanFile {
         for &piece in &self.installation_order {
             let Some(is_named) = is_named.get_mut(usize::from(piece)) else {
                 return Err(wrong(format!(
-                    "the installation order names {piece}, which is no piece"
+                    "the installation order names {piece}, which is not a piece"
                 )));
             };
             if std::mem::replace(is_named, true) {
@@ -82,7 +82,7 @@ impl PlanFile {
             return Ok(());
         }
         Err(wrong(format!(
-            "a clearance of {} mm is none; 0 to {MOST_MM} mm are",
+            "a clearance of {} mm is not possible; it must be 0 to {MOST_MM} mm",
             self.clearance
         )))
     }
@@ -98,7 +98,7 @@ impl PlanFile {
             .find(|fit| !range_mm.contains(&fit.interference_mm))
         {
             Some(fit) => Err(wrong(format!(
-                "a press fit of {} mm is none; up to {} mm are",
+                "a press fit of {} mm is not possible; it must be at most {} mm",
                 fit.interference_mm,
                 PressFit::MOST_INTERFERENCE_MM
             ))),
@@ -124,7 +124,7 @@ impl PlanFile {
         };
         if sizes.is_empty() {
             return Err(wrong(
-                "\"connector_sizes\" is empty; a kit whose seams all have the same size has none".into(),
+                "\"connector_sizes\" is empty; leave it out if all seams have the same size".into(),
             ));
         }
         for size in sizes {

@@ -7,15 +7,15 @@ pub enum PlanFileError {
     #[error("not a plan: {0}")]
     NotJson(#[source] serde_json::Error),
     /// The file is JSON, but a list, a number or a text.
-    #[error("not a plan: it holds no object, which begins with {{")]
+    #[error("not a plan: it contains no object, which begins with {{")]
     NotAnObject,
     /// `format` or `version` has another value or type.
     #[error("\"format\" and \"version\" are not \"shellock-plan\" and a number; build the kit again")]
     OtherFormat,
     /// The file was written in another version of the format.
     #[error(
-        "it is of version {version}, and this program reads {}: build the kit again, or use the program \
-         that made it",
+        "its version is {version}, but this program reads {}: build the kit again, or use the program that \
+         made it",
         super::VERSION
     )]
     OtherVersion {

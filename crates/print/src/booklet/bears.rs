@@ -45,7 +45,7 @@ pub struct WeakPlace {
 pub(super) fn fill(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne: &Borne) {
     let cell = cell_mm(STEPS, 0.0);
     let (left, room_mm) = (x + 1.0, cell[0] - 4.0);
-    page.text([left, y + 6.6], bold(5.0, INK), "what it bears");
+    page.text([left, y + 6.6], bold(5.0, INK), "loads it can take");
     let mut down = y + 6.6;
     for (what, much) in &borne.figures {
         down += LINE_MM;
@@ -61,7 +61,7 @@ pub(super) fn fill(page: &mut Page<'_>, [x, y]: [f64; 2], drawn: &[Drawn<'_>], b
     page.text_within([left, down], room_mm, small(FAINT), &borne.note);
     let Some(weakest) = &borne.weakest else { return };
     down += 1.6 * LINE_MM;
-    page.text([left, down], bold(3.8, ARROW), "gives way first");
+    page.text([left, down], bold(3.8, ARROW), "fails first");
     for line in wrap(page.fonts(), &weakest.words, plain(INK), room_mm) {
         down += LINE_MM;
         page.text_within([left, down], room_mm, plain(INK), &line);

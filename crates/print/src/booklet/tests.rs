@@ -84,10 +84,10 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     assert!(bytes == made(None));
     // The loads take the cell after the end: on a second page after three steps and the end.
     let bears = Borne {
-        figures: vec![("pressed on its top".into(), "70 N".into())],
+        figures: vec![("press on the top".into(), "70 N".into())],
         note: "by simulation".into(),
         weakest: Some(WeakPlace {
-            words: "the seam of pieces 1 and 3 opens".into(),
+            words: "the seam between pieces 1 and 3 opens".into(),
             at: Vec3::new(0.0, -1.0, 5.0),
             lines: vec![vec![Vec3::new(0.0, -1.0, 0.0), Vec3::new(0.0, -1.0, 10.0)]],
             between: [1, 3],
@@ -114,7 +114,7 @@ fn each_page_has_the_name_of_the_model_and_each_step_its_words_as_text() {
     let pages = read(&booklet.pdf());
     assert_eq!(pages.len(), 3);
     assert!(pages.iter().all(|text| text.contains("Größe Ёжик")), "{pages:?}");
-    for words in ["begin with this piece", "from above", "it locks all", "3 of 3"] {
+    for words in ["start with this piece", "from above", "it locks all", "3 of 3"] {
         assert!(pages[2].contains(words), "{words}: {}", pages[2]);
     }
 }

@@ -23,9 +23,9 @@ const MB_PER_MB: f64 = 12.0;
 /// Work on a kit if neither time nor work is limited, s: so that kits do not depend on what runs beside them.
 const USUAL_EFFORT_S: f64 = 60.0;
 /// Message for a model that was made twice.
-const AGAIN: &str = "made twice: beside others the time (--time) was over before a kit passed";
+const AGAIN: &str = "made twice: beside others, the time (--time) ran out before a kit passed";
 /// Message for a model without a kit whose folder holds an earlier one.
-const OLD_KIT: &str = "the kit in its folder is of an earlier run";
+const OLD_KIT: &str = "the kit in its folder is from an earlier run";
 /// Number of lines kept of a process's own last messages.
 const KEPT_LINES: usize = 5;
 
@@ -82,7 +82,7 @@ impl Run {
             folder: options.folder.clone(),
             out: options.out.clone(),
             program: std::env::current_exe()
-                .map_err(|e| Failure::Wrong(format!("the program does not find itself: {e}")))?,
+                .map_err(|e| Failure::Wrong(format!("the program cannot find its own file: {e}")))?,
             arguments,
             made_with,
             patience: patience(options.patience)?,
@@ -118,7 +118,7 @@ impl Run {
             // The first run's kit is still there; the next batch tries again.
             record = first.clone();
             record.said.push(format!(
-                "made again it ended as {}: {}",
+                "the second run ended as {}: {}",
                 second.0.name(),
                 second.1
             ));
@@ -217,7 +217,7 @@ fn with_result(mut record: Record, ended: Ended, is_alone: bool) -> Record {
         let first = ended.errors.len().saturating_sub(KEPT_LINES);
         record.said.extend_from_slice(&ended.errors[first..]);
         if ended.code.is_none() {
-            let killed = "it was killed, as systems do where memory runs out: fewer at a time (--jobs, \
+            let killed = "it was killed, probably because memory ran out: run fewer at a time (--jobs, \
                           --memory)";
             record.said.push(killed.to_owned());
         }

@@ -75,8 +75,8 @@ fn where_all_is_switched_off_all_is_taken_and_told() {
     let build = items(&[1]).replace("/>", " printable=\"0\"/>");
     let loaded = read_model(&cube(1, ""), &build).unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 12);
-    assert_note(&loaded, "every object is switched off");
-    assert_note(&loaded, "all were taken");
+    assert_note(&loaded, "every object is excluded from printing");
+    assert_note(&loaded, "all were used");
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn refusals_name_the_plate_and_the_parts_and_notes_count_what_was_taken() {
         "{refused}"
     );
     let taken = choose(&bytes, Some("base"), Some("2")).unwrap();
-    assert_note(&taken, "1 of 2 objects or parts was taken");
+    assert_note(&taken, "1 of 2 objects or parts was used");
     assert!(!taken.notes.iter().any(|note| note.contains("all were read")));
     assert_note(
         &read_mesh(&bytes, None).unwrap(),
