@@ -1,7 +1,7 @@
 //! A whole job: from a model and options to the files of a kit.
 
 use shellock::Progress;
-use shellock::design::{self, Design, DesignOutcome, Params, Planned, Settings, design};
+use shellock::design::{self, Design, DesignOutcome, NoPlan, Params, Planned, Settings, design};
 use shellock::{Ctx, Warning};
 use shellock_print::Printer;
 

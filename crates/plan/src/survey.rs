@@ -38,7 +38,7 @@ pub fn survey(
     seams: &[Seam],
     sizes: &ConnectorSizes,
 ) -> Result<PlanSurvey, Cancelled> {
-    ctx.stage("who is in whose way", 3)?;
+    ctx.stage("blocked directions", 3)?;
     let n_pieces = surface.n_patches;
     let mut survey = PlanSurvey::empty(n_pieces, params.beta);
     if n_pieces > PieceSet::MAX_PIECES {

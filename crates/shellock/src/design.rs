@@ -99,10 +99,9 @@ fn run<'a, T>(
 
 /// Returns the parameters with the regions to keep whole as triangles of the model.
 fn resolve_params(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Params, DesignError> {
-    Ok(Params {
-        keep_whole: segmentation::resolve_regions(&params.keep_whole, model, labels)?,
-        ..params.clone()
-    })
+    let mut params = params.clone();
+    params.keep_whole = segmentation::resolve_regions(&params.keep_whole, model, labels)?;
+    Ok(params)
 }
 
 /// Tries what the agenda says until an end is good enough or nothing is left to try. Trials that are not done

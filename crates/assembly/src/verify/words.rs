@@ -81,7 +81,7 @@ impl Finding {
                 at,
             } => format!(
                 "piece {piece} {}, {}: its seams are too short for the clearance; try fewer pieces, a \
-                 larger model, labels that cut where it is wider, or a smaller --clearance if your printer \
+                 larger model, labels that cut where it is wider, or a smaller clearance if your printer \
                  holds it",
                 too_wide(play, *most),
                 words.place(*at)

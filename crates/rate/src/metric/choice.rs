@@ -223,7 +223,7 @@ pub fn choose(
     foresight: &Foresight,
     mut found: FoundPlan,
 ) -> Result<Chosen, ChoiceError> {
-    ctx.stage("which plan bears most", 0)?;
+    ctx.stage("strongest plan", 0)?;
     let Choice { params, surface, .. } = *choice;
     let model = &foresight.model;
     let bench = Bench::new(choice.handling, model)?;

@@ -65,8 +65,15 @@ impl Foresight {
     /// Pieces but the key that surely rattle even in the plan whose loosest piece has the least play, the
     /// loosest first.
     pub fn rattling(&self) -> Vec<PatchId> {
-        let steadiest = (self.plans.iter()).min_by(|a, b| widest(&a.1).total_cmp(&widest(&b.1)));
+        let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| loosest_first(plan.plan.key(), excess))
+    }
+
+    /// The plan whose loosest piece has the least play, the first of equals, with the play of each piece as a
+    /// share of the allowed play.
+    pub fn steadiest(&self) -> Option<(&RankedPlan, &[f64])> {
+        let steadiest = (self.plans.iter()).min_by(|a, b| widest(&a.1).total_cmp(&widest(&b.1)))?;
+        Some((&steadiest.0, &steadiest.1))
     }
 
     /// Plans with about the least play.

@@ -217,7 +217,7 @@ fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
         text(svg, [x + 34.0, bottom - share * height + 5.0], "", &words);
     }
     for (i, (paint, words)) in [
-        (TOO_MUCH, "more than the material bears"),
+        (TOO_MUCH, "above the strength of the material"),
         (SOLID, "solid: too thin for a cavity"),
     ]
     .iter()

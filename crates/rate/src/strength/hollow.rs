@@ -33,7 +33,7 @@ const THINNEST_PROPOSED_MM: f64 = 0.8;
     "only {:.0} % of the surface has room for a cavity behind walls of {wall_mm:.2} mm: \
      the model is too thin to be hollow; make it about {size_mm:.0} mm large, \
      or its walls {better_mm:.2} mm thin at most, \
-     or print it in one piece (allow-thin makes pieces all the same)",
+     or print it in one piece (with allow-thin, pieces are made all the same)",
     100.0 * share
 )]
 pub struct TooThin {
@@ -52,7 +52,7 @@ pub struct TooThin {
 #[error(
     "half of the model is no thicker than {thickness_mm:.1} mm, and nowhere is room for connectors \
      behind walls of {wall_mm:.2} mm: make it about {size_mm:.0} mm large{}, \
-     or print it in one piece (allow-thin makes pieces all the same)",
+     or print it in one piece (with allow-thin, pieces are made all the same)",
     thinner(*better_mm)
 )]
 pub struct NoRoom {

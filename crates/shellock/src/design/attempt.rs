@@ -15,7 +15,7 @@ use crate::handling::Handling;
 use crate::key::Turn;
 use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
 use crate::plan::lesson::Lesson;
-use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::plan::{Blocker, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::segmentation::join;
 use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
 
@@ -414,7 +414,7 @@ pub(super) fn next_plan(
     };
     let handling = planning.handling();
     let choice = planning.choice(&handling, allowance.kit_reserve_s);
-    ctx.stage("what would rattle", 0)?;
+    ctx.stage("expected play", 0)?;
     let foresight = Foresight::of(&choice, &found);
     let mut late = None;
     if allowance.is_wanted(Step::JoinPredicted)

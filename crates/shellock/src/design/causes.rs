@@ -18,7 +18,6 @@ pub enum Cause {
 }
 
 impl Diagnostic for Cause {
-    #[expect(clippy::too_many_lines, reason = "a table, one row for each cause")]
     fn tell(&self, pieces: &[PatchId]) -> Told {
         let first = number(pieces, 0);
         match self {

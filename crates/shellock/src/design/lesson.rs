@@ -2,7 +2,7 @@
 
 use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
-use shellock_make::short_connectors;
+use shellock_make::{SeamLengths, short_connectors};
 
 use super::Kit;
 use crate::PatchId;
@@ -80,7 +80,7 @@ fn patch_at(kit: &Kit, at: Vec3) -> PatchId {
 /// Finds pairs whose connectors are too short. Later plans must not rely on them along the same direction.
 fn weak_joints(kit: &Kit) -> Option<Lesson> {
     let weak = short_connectors(&kit.plan, &kit.sizes, &kit.contacts, &kit.joints);
-    let joint = |((later, earlier), [length_mm, seam_mm])| {
+    let joint = |((later, earlier), [length_mm, seam_mm]): SeamLengths| {
         let [later, earlier] = [later, earlier].map(|piece| kit.handover.patch(piece));
         WeakJoint {
             later,

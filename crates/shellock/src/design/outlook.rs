@@ -1,7 +1,7 @@
 //! Outlook of a division before anything is made of it: the pieces as they will be cut, places for a key, and
 //! whether there is a plan. An outlook takes a second, a kit takes a minute.
 
-use shellock_geom::{Solid, Vec3};
+use shellock_geom::Solid;
 
 use super::agenda::{Agenda, Allowance, Grade};
 use super::attempt::{Failure, Found};
@@ -80,10 +80,9 @@ pub fn outlook(
     labels: Option<&[i64]>,
     divided: Option<SegmentedSurface>,
 ) -> Result<Outlook, DesignError> {
-    let params = &Params {
-        proof_budget: 0,
-        ..resolve_params(params, model, labels)?
-    };
+    let mut params = resolve_params(params, model, labels)?;
+    params.proof_budget = 0;
+    let params = &params;
     let input = Input {
         params,
         model,
@@ -172,6 +171,7 @@ fn judge(ctx: &Ctx, parts: Parts<'_, '_>, _: &Allowance) -> Result<Found<Verdict
 
 #[cfg(test)]
 mod tests {
+    use shellock_geom::Vec3;
     use shellock_test_surfaces::{sphere, voronoi};
 
     use super::*;

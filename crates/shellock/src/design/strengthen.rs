@@ -31,7 +31,7 @@ pub(super) fn strengthen(
     let Some((weakest, before)) = weakest_use(&holding.bears, asked) else {
         return Ok((Vec::new(), None));
     };
-    ctx.stage("what would let it bear more", 0)?;
+    ctx.stage("reinforcements", 0)?;
     let rating = WhatIf {
         params: &division.settings.plan,
         surface: &division.surface,

@@ -95,7 +95,7 @@ fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches
     let turn = Turn::align(Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)).0;
     let handover = Handover::new(&turn, found_plan([2, 0, 1]));
     let told = handover.warnings(vec![Warning::new(
-        crate::causes::Design::SeamWithoutConnector { length_mm: 9.0 },
+        crate::causes::Make::SeamWithoutConnector { length_mm: 9.0 },
         vec![PatchId(2), PatchId(1)],
         Some(turn.apply(Vec3::X).to_array()),
     )]);
@@ -380,11 +380,15 @@ fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Ef
 
 /// Parameters by which a piece is the key and nothing is divided again.
 fn at_once() -> Params {
-    let mut params = Params {
-        key: KeySource::Flattest,
-        ..Params::default()
-    };
+    let mut params = with_flat_key();
     params.rounds.refinements = 0;
+    params
+}
+
+/// Parameters by which a piece is the key.
+fn with_flat_key() -> Params {
+    let mut params = Params::default();
+    params.key = KeySource::Flattest;
     params
 }
 
@@ -399,10 +403,8 @@ fn work_that_leads_to_no_plan_or_to_an_error_counts() {
     let (outcome, effort) = halves(&Ctx::quiet(), &at_once());
     assert!(matches!(outcome, Ok(DesignOutcome::NoPlan(_))));
     assert_eq!(effort, in_vain);
-    let too_fine = Params {
-        cell_mm: Some(1e-4),
-        ..at_once()
-    };
+    let mut too_fine = at_once();
+    too_fine.cell_mm = Some(1e-4);
     let (outcome, effort) = halves(&Ctx::quiet(), &too_fine);
     assert!(matches!(outcome, Err(DesignError::Grid(_))));
     assert_eq!(effort, in_vain);
@@ -435,10 +437,7 @@ fn a_half_is_divided_if_two_pieces_cannot_lock() {
     let ball = Ball::new();
     assert_eq!(ball.job(2).surface.n_patches, 2);
     let (ctx, input) = (Ctx::quiet(), ball.input());
-    let params = Params {
-        key: KeySource::Flattest,
-        ..Params::default()
-    };
+    let params = with_flat_key();
     let input_of_piece = Input {
         params: &params,
         ..input
@@ -462,10 +461,7 @@ fn a_half_is_divided_if_two_pieces_cannot_lock() {
 #[test]
 fn joined_pieces_count_as_another_division_only_if_they_can_be_made() {
     let (ball, ctx) = (Ball::new(), Ctx::quiet());
-    let params = Params {
-        key: KeySource::Flattest,
-        ..Params::default()
-    };
+    let params = with_flat_key();
     let input = Input {
         params: &params,
         ..ball.input()

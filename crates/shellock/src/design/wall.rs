@@ -117,10 +117,9 @@ impl Wall {
     }
 
     fn with_thickness(&self, ctx: &Ctx, input: &Input<'_>, mm: f64) -> Result<Self, DesignError> {
-        let params = &Params {
-            thickness: Thickness::Mm(mm),
-            ..input.params.clone()
-        };
+        let mut params = input.params.clone();
+        params.thickness = Thickness::Mm(mm);
+        let params = &params;
         let wall = Self::decide(ctx, &Input { params, ..*input })?;
         Ok(Self {
             is_free: self.is_free,

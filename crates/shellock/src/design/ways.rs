@@ -93,10 +93,8 @@ mod tests {
 
     fn ways_with(change: impl Fn(&mut Params), labels: Option<&[i64]>) -> Vec<Way> {
         let model = Solid::new(sphere(3, Vec3::splat(50.0))).expect("closed");
-        let mut params = Params {
-            method: Method::Auto,
-            ..Params::default()
-        };
+        let mut params = Params::default();
+        params.method = Method::Auto;
         change(&mut params);
         ways(&Input {
             params: &params,
