@@ -484,7 +484,7 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
             "again.ply",
         ],
     );
-    assert!(String::from_utf8_lossy(&o.stderr).contains("no groups divide it; what does: paint"));
+    assert!(String::from_utf8_lossy(&o.stderr).contains("it has no groups to divide it by; it has paint"));
 }
 
 #[test]

@@ -115,15 +115,45 @@ impl Shape {
     }
 }
 
+/// Results of a query for both scopes, which cost little more than one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByScope<T> {
+    /// Result for [`Scope::Everything`].
+    pub everything: Option<T>,
+    /// Result for [`Scope::WhatCounts`].
+    pub what_counts: Option<T>,
+}
+
+impl<T> ByScope<T> {
+    fn map<U>(self, f: impl Fn(T) -> U) -> ByScope<U> {
+        ByScope {
+            everything: self.everything.map(&f),
+            what_counts: self.what_counts.map(&f),
+        }
+    }
+
+    fn of(self, scope: Scope) -> Option<T> {
+        match scope {
+            Scope::Everything => self.everything,
+            Scope::WhatCounts => self.what_counts,
+        }
+    }
+}
+
 /// Finds the place where `a` and `b` come nearest; `None` if that is farther than `within_mm`. Distances are
 /// exact up to rounding, depths to 0.1 µm.
 pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
-    let rest = Translation {
-        along: Vec3::ZERO,
-        from_mm: 0.0,
-        far_mm: 0.0,
-    };
-    Some(Encounter::new([a, b], &rest, scope, within_mm).nearest()?.0)
+    Some(
+        Encounter::new([a, b], &REST, within_mm)?
+            .nearest(&[scope])
+            .of(scope)?
+            .0,
+    )
+}
+
+/// Finds the places where `a` and `b` come nearest, for both scopes, as [`least_gap`] does.
+pub fn least_gaps(a: &Shape, b: &Shape, within_mm: f64) -> ByScope<Gap> {
+    gaps_of([a, b], &REST, within_mm).map(|found| found.0)
 }
 
 /// Finds the place where `moving` comes nearest to `fixed` over all travels of `motion`; `None` if that is
@@ -136,12 +166,39 @@ pub fn swept_gap(
     scope: Scope,
     within_mm: f64,
 ) -> Option<SweptGap> {
-    let (gap, travel_mm) = Encounter::new([moving, fixed], motion, scope, within_mm).nearest()?;
-    Some(SweptGap {
-        gap_mm: gap.gap_mm,
-        travel_mm,
-        at: gap.at,
-    })
+    let encounter = Encounter::new([moving, fixed], motion, within_mm)?;
+    encounter.nearest(&[scope]).of(scope).map(SweptGap::from)
+}
+
+/// Finds the places where `moving` comes nearest to `fixed`, for both scopes, as [`swept_gap`] does.
+pub fn swept_gaps(moving: &Shape, fixed: &Shape, motion: &Translation, within_mm: f64) -> ByScope<SweptGap> {
+    gaps_of([moving, fixed], motion, within_mm).map(SweptGap::from)
+}
+
+fn gaps_of(shapes: [&Shape; 2], motion: &Translation, within_mm: f64) -> ByScope<(Gap, f64)> {
+    let nothing = ByScope {
+        everything: None,
+        what_counts: None,
+    };
+    let encounter = Encounter::new(shapes, motion, within_mm);
+    encounter.map_or(nothing, |e| e.nearest(&[Scope::Everything, Scope::WhatCounts]))
+}
+
+/// No motion.
+const REST: Translation = Translation {
+    along: Vec3::ZERO,
+    from_mm: 0.0,
+    far_mm: 0.0,
+};
+
+impl From<(Gap, f64)> for SweptGap {
+    fn from((gap, travel_mm): (Gap, f64)) -> Self {
+        Self {
+            gap_mm: gap.gap_mm,
+            travel_mm,
+            at: gap.at,
+        }
+    }
 }
 
 /// A triangle that a moving surface passes too closely.
@@ -165,12 +222,12 @@ pub fn find_passed_faces(
     let axes = axes_along(along);
     let meshes = [moving, fixed].map(|mesh| rotate(mesh, axes));
     let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
-    let [a, b] = trees(&meshes, travels, within_mm, |_, _| true);
+    let [a, b] = trees(&meshes, travels, within_mm);
     let mut by = vec![Aabb::EMPTY; b.faces.len()];
     let limit_sq = within_mm * within_mm;
-    for_near_pairs(&a.bvh, &b.bvh, travels, &mut { limit_sq }, |i, j, _| {
+    for_near_pairs(&a.bvh, &b.bvh, travels, &mut { limit_sq }, |i, j, _, _| {
         if swept(a.bvh.corners[i], b.bvh.corners[j], travels, limit_sq).is_some() {
-            let mover = Aabb::around(moving.corners(a.faces[a.bvh.faces[i] as usize] as usize));
+            let mover = Aabb::around(moving.corners(a.face(i) as usize));
             let of_face = &mut by[b.bvh.faces[j] as usize];
             *of_face = of_face.union(mover);
         }
@@ -196,15 +253,23 @@ struct Tree {
 }
 
 impl<'a> Encounter<'a> {
-    fn new(shapes: [&'a Shape; 2], motion: &Translation, scope: Scope, limit_mm: f64) -> Self {
+    /// Prepares the triangles that may come within the limit; `None` if the shapes' boxes do not.
+    fn new(shapes: [&'a Shape; 2], motion: &Translation, limit_mm: f64) -> Option<Self> {
         let along = motion.along.normalize_or_zero();
         let axes = axes_along(along);
+        if are_apart(
+            shapes.map(|shape| rotate_box(shape.bounds, axes)),
+            along,
+            motion,
+            limit_mm,
+        ) {
+            return None;
+        }
         let meshes = shapes.map(|shape| rotate(shape.solid.mesh(), axes));
         let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
-        let in_scope = |which: usize, f: usize| scope == Scope::Everything || shapes[which].counts[f];
-        let trees = trees(&meshes, travels, limit_mm, in_scope);
+        let trees = trees(&meshes, travels, limit_mm);
         let [moving, fixed] = shapes;
-        Self {
+        Some(Self {
             passage: Passage {
                 mover: moving,
                 obstacle: fixed,
@@ -214,64 +279,107 @@ impl<'a> Encounter<'a> {
             axes,
             limit_mm,
             trees,
+        })
+    }
+
+    /// Finds the least gap, and the travel at which it occurs, for each of `scopes`.
+    fn nearest(&self, scopes: &[Scope]) -> ByScope<(Gap, f64)> {
+        let approaches = self.approaches(scopes);
+        let touches = |a: Option<Approach>| a.is_some_and(|a| a.distance_sq <= TOUCH_MM * TOUCH_MM);
+        // Parts that count touch only where something touches.
+        let is_met = touches(approaches.everything) || touches(approaches.what_counts);
+        let crossings = if is_met { self.crossings() } else { Vec::new() };
+        let of = |scope: Scope| {
+            let approach = approaches.of(scope);
+            let deepest = self.deepest(scope, touches(approach), &crossings);
+            if deepest.depth_mm > TOUCH_MM {
+                return Some((
+                    gap_between(-deepest.depth_mm, deepest.point, deepest.surface),
+                    deepest.travel_mm,
+                ));
+            }
+            let [x, y, z] = self.axes;
+            let approach = approach?;
+            let [on_a, on_b] = [approach.on_a, approach.on_b].map(|p| p.x * x + p.y * y + p.z * z);
+            let gap_mm = if touches(Some(approach)) {
+                0.0
+            } else {
+                approach.distance_sq.sqrt()
+            };
+            Some((gap_between(gap_mm, on_a, on_b), approach.travel_mm))
+        };
+        let asked = |scope| scopes.contains(&scope).then(|| of(scope)).flatten();
+        ByScope {
+            everything: asked(Scope::Everything),
+            what_counts: asked(Scope::WhatCounts),
         }
     }
 
-    /// Finds the least gap, and the travel at which it occurs.
-    fn nearest(&self) -> Option<(Gap, f64)> {
-        let approach = self.approach();
-        let touches = approach.is_some_and(|a| a.distance_sq <= TOUCH_MM * TOUCH_MM);
-        let deepest = self.deepest(touches);
-        if deepest.depth_mm > TOUCH_MM {
-            return Some((
-                gap_between(-deepest.depth_mm, deepest.point, deepest.surface),
-                deepest.travel_mm,
-            ));
-        }
-        let [x, y, z] = self.axes;
-        let approach = approach?;
-        let [on_a, on_b] = [approach.on_a, approach.on_b].map(|p| p.x * x + p.y * y + p.z * z);
-        let gap_mm = if touches { 0.0 } else { approach.distance_sq.sqrt() };
-        Some((gap_between(gap_mm, on_a, on_b), approach.travel_mm))
-    }
-
-    /// Finds the nearest approach of the surfaces within the limit. If they meet, it is the first meeting
-    /// found.
-    fn approach(&self) -> Option<Approach> {
+    /// Finds the nearest approach of the surfaces within the limit, for each of `scopes`, in one traversal. If
+    /// the surfaces meet, it is the first meeting found.
+    fn approaches(&self, scopes: &[Scope]) -> ByScope<Approach> {
         let ([a, b], travels) = (&self.trees, self.passage.travels);
-        let mut best: Option<Approach> = None;
-        let mut limit_sq = self.limit_mm * self.limit_mm;
-        for_near_pairs(&a.bvh, &b.bvh, travels, &mut limit_sq, |i, j, limit_sq| {
-            if let Some(found) = swept(a.bvh.corners[i], b.bvh.corners[j], travels, *limit_sq)
-                && best.is_none_or(|b| found.distance_sq < b.distance_sq)
-            {
-                best = Some(found);
-                // Nothing is nearer than touching, so a negative limit ends the search.
-                *limit_sq = if found.distance_sq <= TOUCH_MM * TOUCH_MM {
-                    -1.0
-                } else {
-                    found.distance_sq
-                };
+        let mut best: [Option<Approach>; 2] = [None; 2];
+        // Nothing is nearer than touching, so a negative limit ends the search of a scope.
+        let mut limits_sq = [Scope::Everything, Scope::WhatCounts].map(|scope| {
+            if scopes.contains(&scope) && self.has_any(scope) {
+                self.limit_mm * self.limit_mm
+            } else {
+                -1.0
             }
         });
-        best
+        let mut limit_sq = limits_sq[0].max(limits_sq[1]);
+        for_near_pairs(
+            &a.bvh,
+            &b.bvh,
+            travels,
+            &mut limit_sq,
+            |i, j, apart_sq, limit_sq| {
+                let counts = self.counts(0, a.face(i)) && self.counts(1, b.face(j));
+                let within_sq = if counts { *limit_sq } else { limits_sq[0] };
+                if apart_sq > within_sq {
+                    return;
+                }
+                let Some(found) = swept(a.bvh.corners[i], b.bvh.corners[j], travels, within_sq) else {
+                    return;
+                };
+                for scope in 0..=usize::from(counts) {
+                    if found.distance_sq <= limits_sq[scope]
+                        && best[scope].is_none_or(|b| found.distance_sq < b.distance_sq)
+                    {
+                        best[scope] = Some(found);
+                        limits_sq[scope] = if found.distance_sq <= TOUCH_MM * TOUCH_MM {
+                            -1.0
+                        } else {
+                            found.distance_sq
+                        };
+                    }
+                }
+                *limit_sq = limits_sq[0].max(limits_sq[1]);
+            },
+        );
+        ByScope {
+            everything: best[0],
+            what_counts: best[1],
+        }
     }
 
-    /// Pairs of triangles that touch at any travel.
+    /// Pairs of triangles that touch at any travel, sorted.
     fn crossings(&self) -> Vec<(u32, u32)> {
         let ([a, b], travels) = (&self.trees, self.passage.travels);
         let mut crossings = Vec::new();
         let touch_sq = TOUCH_MM * TOUCH_MM;
-        for_near_pairs(&a.bvh, &b.bvh, travels, &mut { touch_sq }, |i, j, _| {
+        for_near_pairs(&a.bvh, &b.bvh, travels, &mut { touch_sq }, |i, j, _, _| {
             if swept(a.bvh.corners[i], b.bvh.corners[j], travels, touch_sq).is_some() {
-                crossings.push((a.faces[a.bvh.faces[i] as usize], b.faces[b.bvh.faces[j] as usize]));
+                crossings.push((a.face(i), b.face(j)));
             }
         });
+        crossings.sort_unstable();
         crossings
     }
 
-    /// Finds the deepest point of either shape in the other.
-    fn deepest(&self, touches: bool) -> Deepest {
+    /// Finds the deepest point of either shape in the other, of the triangles in scope.
+    fn deepest(&self, scope: Scope, touches: bool, crossings: &[(u32, u32)]) -> Deepest {
         let Passage {
             mover: moving,
             obstacle: fixed,
@@ -287,9 +395,14 @@ impl<'a> Encounter<'a> {
         if !touches && !moved.intersects(fixed.bounds) {
             return best;
         }
-        let mut crossings = if touches { self.crossings() } else { Vec::new() };
-        crossings.sort_unstable();
-        self.passage.deepen(&self.trees[0].faces, &crossings, &mut best);
+        let in_scope = |which: usize, face: u32| scope == Scope::Everything || self.counts(which, face);
+        let is_crossing = |c: &&(u32, u32)| touches && in_scope(0, c.0) && in_scope(1, c.1);
+        let crossings: Vec<(u32, u32)> = crossings.iter().filter(is_crossing).copied().collect();
+        let near = |which: usize| -> Vec<u32> {
+            let faces = self.trees[which].faces.iter().copied();
+            faces.filter(|f| in_scope(which, *f)).collect()
+        };
+        self.passage.deepen(&near(0), &crossings, &mut best);
 
         // Now with exchanged roles: the fixed shape moves backwards past the moving one.
         let mut flipped: Vec<(u32, u32)> = crossings.into_iter().map(|(a, b)| (b, a)).collect();
@@ -304,7 +417,7 @@ impl<'a> Encounter<'a> {
             depth_mm: best.depth_mm,
             ..Deepest::default()
         };
-        backwards.deepen(&self.trees[1].faces, &flipped, &mut theirs);
+        backwards.deepen(&near(1), &flipped, &mut theirs);
         if theirs.depth_mm > best.depth_mm {
             let shift = theirs.travel_mm * along;
             best = Deepest {
@@ -315,13 +428,26 @@ impl<'a> Encounter<'a> {
         }
         best
     }
+
+    fn counts(&self, which: usize, face: u32) -> bool {
+        let shape = [self.passage.mover, self.passage.obstacle][which];
+        shape.counts[face as usize]
+    }
+
+    /// Returns true if both shapes have a triangle in scope that may come within the limit.
+    fn has_any(&self, scope: Scope) -> bool {
+        let has = |which: usize| {
+            let mut faces = self.trees[which].faces.iter();
+            faces.any(|&f| scope == Scope::Everything || self.counts(which, f))
+        };
+        has(0) && has(1)
+    }
 }
 
 impl Tree {
-    /// Builds the hierarchy of the triangles of `mesh` that are in scope and meet `room`.
-    fn of(mesh: &TriMesh, room: Aabb, in_scope: impl Fn(usize) -> bool) -> Self {
-        let is_near =
-            |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
+    /// Builds the hierarchy of the triangles of `mesh` that meet `room`.
+    fn of(mesh: &TriMesh, room: Aabb) -> Self {
+        let is_near = |&f: &u32| Aabb::around(mesh.corners(f as usize)).intersects(room);
         let faces: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_near).collect();
         let triangles = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
         Self {
@@ -331,6 +457,11 @@ impl Tree {
             }),
             faces,
         }
+    }
+
+    /// Index in the shape of a triangle in leaf order.
+    fn face(&self, leaf: usize) -> u32 {
+        self.faces[self.bvh.faces[leaf] as usize]
     }
 }
 
@@ -343,6 +474,25 @@ fn axes_along(along: Vec3) -> [Vec3; 3] {
     [x, y, along]
 }
 
+/// Box, in these axes, around a turned box.
+fn rotate_box(bounds: Aabb, axes: [Vec3; 3]) -> Aabb {
+    let (middle, half) = (bounds.center(), 0.5 * bounds.size());
+    let middle = Vec3::from(axes.map(|axis| axis.dot(middle)));
+    let half = Vec3::from(axes.map(|axis| axis.abs().dot(half)));
+    Aabb {
+        min: middle - half,
+        max: middle + half,
+    }
+}
+
+/// Returns true if a moving and a fixed shape within these boxes, whose z is along the motion, stay farther
+/// than `limit_mm` apart at all travels.
+fn are_apart(bounds: [Aabb; 2], along: Vec3, motion: &Translation, limit_mm: f64) -> bool {
+    let [moving, fixed] = bounds;
+    let travels = travels_of(motion, along, bounds);
+    !sweep_box(moving, travels).grown(limit_mm).intersects(fixed)
+}
+
 fn rotate(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
     let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
     TriMesh {
@@ -352,20 +502,12 @@ fn rotate(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
 }
 
 /// Hierarchies of the triangles of a moving and a fixed mesh that can come within `limit_mm` of the other
-/// mesh. `counts` is given the mesh and the triangle, and accepts those in scope.
-fn trees(
-    meshes: &[TriMesh; 2],
-    travels: [f64; 2],
-    limit_mm: f64,
-    counts: impl Fn(usize, usize) -> bool,
-) -> [Tree; 2] {
+/// mesh.
+fn trees(meshes: &[TriMesh; 2], travels: [f64; 2], limit_mm: f64) -> [Tree; 2] {
     let [a, b] = meshes.each_ref().map(TriMesh::bounds);
     let room_of_a = sweep_box(b, [-travels[1], -travels[0]]).grown(limit_mm);
     let room_of_b = sweep_box(a, travels).grown(limit_mm);
-    [
-        Tree::of(&meshes[0], room_of_a, |f| counts(0, f)),
-        Tree::of(&meshes[1], room_of_b, |f| counts(1, f)),
-    ]
+    [Tree::of(&meshes[0], room_of_a), Tree::of(&meshes[1], room_of_b)]
 }
 
 /// Travels of `motion` that matter for two boxes in its axes; only 0 if it has no direction.

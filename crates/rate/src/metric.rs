@@ -20,13 +20,13 @@ mod what_if;
 
 pub use choice::{
     BY_SIMULATION, Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
-    SeamHolding, WeakestUse, choose,
+    SeamHolding, WeakestUse, choose, choose_or_change,
 };
-pub use climb::{ClimbError, ClimbParams, Climbed, climb};
+pub use climb::{ClimbError, ClimbParams, ClimbRules, Climbed, climb};
 pub use data_driven::{data_driven, pieces_alone};
 pub use deform::{Deformed, DeformedLoad, Told, Touch};
 pub use foreseen::{Foreseen, foreseen};
 pub use foresight::Foresight;
-pub use model::{MetricParams, PlanModel};
-pub use rating::{Bench, Rated};
+pub use model::{EvenSurface, MetricParams, PlanModel};
+pub use rating::{Bench, RESERVE, Rated};
 pub use what_if::{WhatIf, is_worth, weakest_use};

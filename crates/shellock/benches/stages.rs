@@ -124,6 +124,8 @@ fn choice_of_plan(bencher: Bencher) {
             let choice = metric::Choice {
                 params: &params,
                 surface: &surface,
+                even: &metric::EvenSurface::new(&surface, 1.0),
+                former: None,
                 sizes: &sizes,
                 survey: &tables,
                 constraints: &PlanConstraints::default(),

@@ -7,7 +7,7 @@ use clap::Args;
 use shellock::Ctx;
 use shellock::design::{Params, Settings};
 use shellock::handling::Handling;
-use shellock::metric::{Choice, ClimbParams, Foresight, choose};
+use shellock::metric::{Choice, ClimbParams, EvenSurface, Foresight, choose};
 use shellock::plan::study::Technique;
 use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search};
 use shellock::segmentation::Method;
@@ -210,6 +210,8 @@ fn held(
     let choice = Choice {
         params: &settings.plan,
         surface,
+        even: &EvenSurface::new(surface, 1.0),
+        former: None,
         sizes,
         survey,
         constraints: &PlanConstraints::default(),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use shellock::design::Settings;
 use shellock::handling::Handling;
-use shellock::metric::{Choice, ClimbParams, Foresight, MetricParams, choose};
+use shellock::metric::{Choice, ClimbParams, EvenSurface, Foresight, MetricParams, choose};
 use shellock::plan::{PlanConstraints, PlanOutcome, search};
 use shellock::stress_test::{Comparison, Outcome, StressParams, StressVerdict};
 use shellock::{Ctx, InstallationPlan};
@@ -47,6 +47,8 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
     let choice = Choice {
         params: &settings.plan,
         surface: &surface,
+        even: &EvenSurface::new(&surface, 1.0),
+        former: None,
         sizes: &sizes,
         survey: &survey,
         constraints: &constraints,

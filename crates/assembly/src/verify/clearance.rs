@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::clearance::{Scope, Shape, Translation, least_gap, swept_gap};
+use shellock_geom::clearance::{Gap, Shape, SweptGap, Translation, least_gaps, swept_gaps};
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::{Solid, TriMesh};
 
@@ -117,14 +117,13 @@ pub fn pair_gaps(ctx: &Ctx, shapes: &PieceShapes) -> Result<Vec<PairGap>, Cancel
         .flat_map(|(i, &a)| ids[i + 1..].iter().map(move |&b| (a, b)));
     among(ctx, pairs.collect(), |(a, b)| {
         let (shape_a, shape_b) = (shapes.0[a].as_ref()?, shapes.0[b].as_ref()?);
-        let of = |scope| {
-            least_gap(shape_a, shape_b, scope, WITHIN_MM).map(|g| place(g.gap_mm, 0.0, g.at.to_array()))
-        };
+        let gaps = least_gaps(shape_a, shape_b, WITHIN_MM);
+        let of = |gap: Gap| place(gap.gap_mm, 0.0, gap.at.to_array());
         Some(PairGap {
             a,
             b,
-            overall: of(Scope::Everything)?,
-            beneath_rim: of(Scope::WhatCounts),
+            overall: gaps.everything.map(of)?,
+            beneath_rim: gaps.what_counts.map(of),
         })
     })
 }
@@ -147,15 +146,13 @@ pub fn path_gaps(
             from_mm: 0.0,
             far_mm: f64::INFINITY,
         };
-        let of = |scope| {
-            let gap = swept_gap(moving, fixed, &way_out, scope, WITHIN_MM)?;
-            Some(place(gap.gap_mm, gap.travel_mm, gap.at.to_array()))
-        };
+        let gaps = swept_gaps(moving, fixed, &way_out, WITHIN_MM);
+        let of = |gap: SweptGap| place(gap.gap_mm, gap.travel_mm, gap.at.to_array());
         Some(PathGap {
             piece,
             against,
-            overall: of(Scope::Everything)?,
-            beneath_rim: of(Scope::WhatCounts),
+            overall: gaps.everything.map(of)?,
+            beneath_rim: gaps.what_counts.map(of),
         })
     })
 }

@@ -503,7 +503,7 @@ fn plates() -> Vec<Case> {
         Case::new("parts_apart.3mf", pair).says(&[Refused("\"thing\" with the parts \"Body\", \"Base\"")]),
         Case::new("plate_off.3mf", off)
             .with(&["--plate", "1"])
-            .says(&[Refused("plate 1 holds nothing that the slicer is to print")]),
+            .says(&[Refused("plate 1 has nothing to print")]),
         Case::new("plates.3mf", bytes.clone()).says(&[Refused(
             "\"cat\" (plate 1), \"dog\" (plate 2), \"base\" (plate 3)",
         )]),
@@ -550,8 +550,7 @@ fn sizes() -> Vec<Case> {
             .proves("3MF", "read", "the size that the file states"),
         Case::new("tiny.3mf", of("unit=\"centimeter\"", 0.02))
             .says(&[Size([12.0, 8.0, 6.0]), Warning("unusually small")]),
-        Case::new("no_unit.3mf", of("", 20.0))
-            .says(&[Size([150.0, 100.0, 75.0]), Warning("it is made 150 mm")]),
+        Case::new("no_unit.3mf", of("", 20.0)).says(&[Size([150.0, 100.0, 75.0]), Warning("is made 150 mm")]),
         Case::new(
             "far_modifier.3mf",
             with(PRUSA, modifier, &object(1, "", &mesh(&far, "")), ITEM),

@@ -152,10 +152,10 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
     let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
     assert_note(&loaded, "support");
-    assert!(!loaded.notes.iter().any(|n| n.contains("does not have")));
+    assert!(!loaded.notes.iter().any(|n| n.contains("missing from the file")));
     let none = resources.replace(r#"p1="1""#, r#"p1="2""#);
     let loaded = read_model(&none, r#"<item objectid="1"/>"#).unwrap();
-    assert_note(&loaded, "1 triangle(s) have a colour");
+    assert_note(&loaded, "1 triangle(s) refer to a colour");
     let materials = format!(r#"<basematerials id="5"/><object id="1" pid="5" pindex="0">{painted}</object>"#);
     let loaded = read_model(&materials, r#"<item objectid="1"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 1, 0, 0][..]));
@@ -170,7 +170,7 @@ fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
     )
     .unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 4);
-    assert_note(&loaded, "not to print");
+    assert_note(&loaded, "excluded from printing");
     let alone = read_model(&resources, r#"<item objectid="2" printable="0"/>"#).unwrap();
     assert_eq!(alone.mesh.triangles.len(), 4);
 }

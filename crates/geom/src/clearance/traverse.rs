@@ -3,15 +3,15 @@
 use super::pair::{box_distance_sq, sweep_box, swept_box};
 use crate::bvh::TriangleBvh;
 
-/// Calls `near(i, j, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq` of each
+/// Calls `near(i, j, apart_sq, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq` of each
 /// other. `i` is a triangle of `a`, moved along z by all `travels`, and `j` one of `b`, both in leaf order.
-/// `near` may lower the limit. Nearer boxes come first.
+/// `apart_sq` is the squared distance of the boxes. `near` may lower the limit. Nearer boxes come first.
 pub(super) fn for_near_pairs(
     a: &TriangleBvh,
     b: &TriangleBvh,
     travels: [f64; 2],
     limit_sq: &mut f64,
-    mut near: impl FnMut(usize, usize, &mut f64),
+    mut near: impl FnMut(usize, usize, f64, &mut f64),
 ) {
     let apart = |i: u32, j: u32| {
         box_distance_sq(
@@ -33,8 +33,9 @@ pub(super) fn for_near_pairs(
                 for k in m.triangles() {
                     let around = swept_box(a.corners[k], travels);
                     for l in n.triangles() {
-                        if box_distance_sq(around, swept_box(b.corners[l], [0.0; 2])) <= *limit_sq {
-                            near(k, l, limit_sq);
+                        let apart_sq = box_distance_sq(around, swept_box(b.corners[l], [0.0; 2]));
+                        if apart_sq <= *limit_sq {
+                            near(k, l, apart_sq, limit_sq);
                         }
                     }
                 }

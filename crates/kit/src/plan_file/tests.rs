@@ -162,7 +162,7 @@ fn what_is_no_plan_is_refused() {
     assert!(complaint("/version", Some(json!("2"))).contains("build the kit again"));
     let later = complaint("/version", Some(json!(3)));
     assert!(
-        later.starts_with("it is of version 3, and this program reads 2"),
+        later.starts_with("its version is 3, but this program reads 2"),
         "{later}"
     );
     assert!(complaint("/format", Some(json!("x"))).contains("build the kit again"));

@@ -15,11 +15,15 @@ pub struct WallGrid {
 }
 
 impl WallGrid {
-    /// Forgets the distances to other pieces, and makes sure that there will be this much room.
-    pub fn begin_division(&mut self, room_mm: f64) {
+    /// Forgets the distances to other pieces.
+    pub fn begin_division(&mut self) {
         self.distances = None;
+    }
+
+    /// Makes sure that there will be this much room below the wall, mm.
+    pub fn reserve(&mut self, room_mm: f64) {
         if room_mm > self.room_mm {
-            (self.room_mm, self.grid) = (room_mm, None);
+            (self.room_mm, self.grid, self.distances) = (room_mm, None, None);
         }
     }
 

@@ -1,5 +1,7 @@
 //! Choice of the strongest plan that the search allows, and its weak places (Sect. 6.2).
 
+use std::convert::Infallible;
+
 use crate::causes::Cause;
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
@@ -12,10 +14,10 @@ use shellock_plan::{
 use shellock_report::{Cancelled, Ctx, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 
-use super::climb::{ClimbError, ClimbParams, Climbed, climb};
+use super::climb::{Ascent, ClimbError, ClimbParams, ClimbRules, Climbed};
 use super::foresight::{COST_SLACK, Foresight};
 use super::rating::{Bench, Rated};
-use super::{Deformed, Foreseen, PlanModel, foreseen};
+use super::{Deformed, EvenSurface, Foreseen, PlanModel, foreseen};
 use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
 
 /// Relative difference below which costs count as equal, against rounding.
@@ -188,6 +190,8 @@ pub struct Choice<'a> {
     pub params: &'a PlanParams,
     /// Surface of the pieces.
     pub surface: &'a SegmentedSurface,
+    /// The same with even triangles.
+    pub even: &'a EvenSurface,
     /// Connector sizes of each pair.
     pub sizes: &'a ConnectorSizes,
     /// Survey of the pieces.
@@ -198,6 +202,8 @@ pub struct Choice<'a> {
     pub handling: &'a Handling,
     /// Limits of the climb's effort.
     pub climb: ClimbParams,
+    /// The strongest plan of the same pieces with other connectors, if there is one: a start of the climb.
+    pub former: Option<&'a LatticePlan>,
 }
 
 /// The strongest plan, and its properties.
@@ -221,39 +227,75 @@ pub fn choose(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
     foresight: &Foresight,
-    mut found: FoundPlan,
+    found: FoundPlan,
 ) -> Result<Chosen, ChoiceError> {
+    let chosen = choose_or_change(ctx, choice, foresight, found, |_, _| None::<Infallible>)?;
+    chosen.map_err(|never| match never {})
+}
+
+/// Chooses a plan as [`choose`] does, or a change to make first. Once the uses are climbed, `change` sees the
+/// plan and its load factors in use. What it returns is returned in place of a plan, and no other goal is
+/// climbed.
+pub fn choose_or_change<T>(
+    ctx: &Ctx<'_>,
+    choice: &Choice<'_>,
+    foresight: &Foresight,
+    mut found: FoundPlan,
+    change: impl FnOnce(&RankedPlan, &[LoadBorne]) -> Option<T>,
+) -> Result<Result<Chosen, T>, ChoiceError> {
     ctx.stage("strongest plan", 0)?;
-    let Choice { params, surface, .. } = *choice;
     let model = &foresight.model;
     let bench = Bench::new(choice.handling, model)?;
-    let Climbed {
-        best,
-        n_plans: n_compared,
-        is_cut_short,
-        ..
-    } = most_bearing(ctx, choice, foresight, &bench, &found)?;
-    let chosen = best.candidate.clone();
-    let solved = bench.surface.resist(&best.meetings, chosen.plan.key().0)?;
+    let climbed = match strongest(ctx, choice, foresight, &bench, &found, change)? {
+        Ok(climbed) => climbed,
+        Err(changed) => return Ok(Err(changed)),
+    };
+    let chosen = climbed.best.candidate.clone();
+    let holding = hold(choice, model, &bench, &climbed)?;
+    warn(ctx, model, &holding, &chosen);
+    let deformation = Deformed::of(model, &bench, &climbed.best, &holding.bears)?;
+    found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
+    (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
+    found.pool.retain(|p| p.plan != chosen.plan);
+    found.pool.insert(0, chosen);
+    Ok(Ok(Chosen {
+        search_result: found,
+        holding,
+        deformation,
+        is_cut_short: climbed.is_cut_short,
+    }))
+}
+
+/// Resistance of the plan that was climbed to.
+fn hold(
+    choice: &Choice<'_>,
+    model: &PlanModel,
+    bench: &Bench<'_>,
+    climbed: &Climbed<'_>,
+) -> Result<Holding, ChoiceError> {
+    let (best, plan) = (&climbed.best, &climbed.best.candidate.plan);
+    let solved = bench.surface.resist(&best.meetings, plan.key().0)?;
     let Foreseen {
         play: foreseen_play,
         excess: foreseen_excess,
     } = foreseen(
         model,
-        &chosen.plan,
+        plan,
         &best.meetings,
-        surface.mesh.bounds().size().max_element(),
-        params.clearance_mm,
+        choice.surface.mesh.bounds().size().max_element(),
+        choice.params.clearance_mm,
     );
-    let bears = bears(model, &bench, &best);
-    let deformed = Deformed::of(model, &bench, &best, &bears)?;
-    let holding = Holding {
-        n_compared,
+    Ok(Holding {
+        n_compared: climbed.n_plans,
         foreseen_play,
         foreseen_excess,
-        bears,
-        ..collect_holding(model, &chosen.plan, &best.meetings, &solved.resistance)
-    };
+        bears: bears(model, bench, best),
+        ..collect_holding(model, plan, &best.meetings, &solved.resistance)
+    })
+}
+
+/// Warns of pieces that come apart, of pieces that are loose, and of a use that the plan does not withstand.
+fn warn(ctx: &Ctx<'_>, model: &PlanModel, holding: &Holding, chosen: &RankedPlan) {
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
     }
@@ -267,42 +309,56 @@ pub fn choose(
     {
         warn_of_use(ctx, weakest);
     }
-    found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
-    (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
-    found.pool.retain(|p| p.plan != chosen.plan);
-    found.pool.insert(0, chosen);
-    Ok(Chosen {
-        search_result: found,
-        holding,
-        deformation: deformed,
-        is_cut_short,
-    })
 }
 
-/// The strongest plan, and how it was found.
-fn most_bearing<'b>(
+/// The strongest plan, and how it was found; or the change to make first.
+fn strongest<'b, T>(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
     foresight: &Foresight,
-    bench: &'b Bench<'_>,
+    bench: &'b Bench<'b>,
     found: &FoundPlan,
-) -> Result<Climbed<'b>, ChoiceError> {
+    change: impl FnOnce(&RankedPlan, &[LoadBorne]) -> Option<T>,
+) -> Result<Result<Climbed<'b>, T>, ChoiceError> {
     let Some(first) = found.pool.first() else {
         return Err(ChoiceError::NoPlan);
     };
     let most_cost = found.score.worst * (1.0 + COST_SLACK);
     let counted = found.apply_counts(choice.survey);
-    let around = Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
-    let may_be = |p: &RankedPlan| foresight.is_steady(&p.plan);
-    let starts = foresight.steady();
-    match climb(ctx, choice.climb, bench, &around, &starts, &may_be) {
-        Ok(climbed) => Ok(climbed),
-        Err(ClimbError::NoPlan) => Ok(Climbed {
-            best: bench.rate(first.clone())?,
-            n_plans: 1,
-            n_solves: 0,
-            is_cut_short: false,
-        }),
+    let around = &Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
+    let may_be = &|p: &RankedPlan| foresight.is_steady(&p.plan);
+    let former = choice.former.and_then(|plan| around.rank(plan.clone()));
+    let mut starts: Vec<RankedPlan> = former.into_iter().filter(may_be).collect();
+    starts.extend(foresight.steady());
+    let params = choice.climb;
+    let rules = ClimbRules {
+        params,
+        around,
+        may_be,
+    };
+    let is_changed = |rated: &Rated<'_>| change(&rated.candidate, &bears(&foresight.model, bench, rated));
+    let climbed = match Ascent::of_use(ctx, rules, bench, &starts) {
+        Ok(ascent) => match is_changed(&ascent.best) {
+            Some(changed) => return Ok(Err(changed)),
+            None => ascent.finish(),
+        },
+        Err(ClimbError::NoPlan) => {
+            let best = bench.rate(first.clone())?;
+            if let Some(changed) = is_changed(&best) {
+                return Ok(Err(changed));
+            }
+            Ok(Climbed {
+                best,
+                n_plans: 1,
+                n_solves: 0,
+                is_cut_short: false,
+            })
+        }
+        Err(e) => Err(e),
+    };
+    match climbed {
+        Ok(climbed) => Ok(Ok(climbed)),
+        Err(ClimbError::NoPlan) => Err(ChoiceError::NoPlan),
         Err(ClimbError::Solve(e)) => Err(e.into()),
         Err(ClimbError::Cancelled(e)) => Err(e.into()),
     }

@@ -18,7 +18,7 @@ use shellock_geom::sparse::SparseError;
 use shellock_plan::{LatticePlan, Neighbourhood, RankedPlan};
 use shellock_report::{Cancelled, Ctx, PatchId};
 
-use super::rating::{Bench, Rank, Rated};
+use super::rating::{Bench, RESERVE, Rank, Rated};
 
 /// Number of moves tried in parallel before the best of them is taken.
 const BATCH: usize = 8;
@@ -31,8 +31,12 @@ const LEAST_OF_PEAK: f64 = 0.97;
 /// Limits of a climb's effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClimbParams {
-    /// Greatest number of loads that may be solved.
-    pub n_solves: usize,
+    /// Greatest number of loads that may be solved for the sake of use.
+    pub n_of_use: usize,
+    /// Greatest number of loads that may be solved for the sake of the pull on all seams.
+    pub n_of_pull: usize,
+    /// Greatest number of loads that may be solved for the sake of falls.
+    pub n_of_falls: usize,
     /// Number of plans from which the climb starts.
     pub n_starts: usize,
     /// Time to keep back for later work, s; ≥ 0. The climb ends when no more than that is left of a limited
@@ -43,22 +47,12 @@ pub struct ClimbParams {
 impl Default for ClimbParams {
     fn default() -> Self {
         Self {
-            n_solves: 4000,
+            n_of_use: 2400,
+            n_of_pull: 600,
+            n_of_falls: 400,
             n_starts: 4,
             reserve_s: 0.0,
         }
-    }
-}
-
-impl ClimbParams {
-    /// Number of loads that may be solved until the goals of a rank, and those before, are climbed.
-    fn until(&self, rank: Rank) -> usize {
-        let tenths = match rank {
-            Rank::Use => 6,
-            Rank::Pull => 9,
-            Rank::Fall | Rank::Hang => 10,
-        };
-        self.n_solves * tenths / 10
     }
 }
 
@@ -88,48 +82,92 @@ pub enum ClimbError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Climbs from `starts`, which keep all conditions. `may_be` must accept a plan before it is taken.
+/// Conditions of a climb.
+#[derive(Clone, Copy)]
+pub struct ClimbRules<'c> {
+    /// Limits of the climb's effort.
+    pub params: ClimbParams,
+    /// Moves of a plan that keep all conditions of the search.
+    pub around: &'c Neighbourhood<'c>,
+    /// Further condition on a plan before it is taken.
+    pub may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
+}
+
+/// Climbs from `starts`, which keep all conditions, goal by goal to the end.
 pub fn climb<'b>(
     ctx: &Ctx<'_>,
-    params: ClimbParams,
+    rules: ClimbRules<'_>,
     bench: &'b Bench<'b>,
-    around: &Neighbourhood<'_>,
     starts: &[RankedPlan],
-    may_be: &(dyn Fn(&RankedPlan) -> bool + Sync),
 ) -> Result<Climbed<'b>, ClimbError> {
-    let mut climber = Climber {
-        ctx,
-        bench,
-        around,
-        may_be,
-        n_plans: 0,
-        n_solves: 0,
-        reserve_s: params.reserve_s,
-        is_cut_short: false,
-        floors: vec![0.0; bench.ranks.len()],
-    };
-    let starts = climber.best_starts(starts, params.n_starts)?;
-    let (n, until) = (starts.len(), params.until(Rank::Use));
-    let mut best: Option<Rated<'b>> = None;
-    for (i, start) in starts.into_iter().enumerate() {
-        // Each start gets its share of the remaining solves.
-        let left = until.saturating_sub(climber.n_solves);
-        let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
-        if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
-            best = Some(top);
+    Ascent::of_use(ctx, rules, bench, starts)?.finish()
+}
+
+/// A climb of which the uses are done.
+pub(super) struct Ascent<'c, 'b> {
+    climber: Climber<'c, 'b>,
+    /// The plan that withstands use best.
+    pub best: Rated<'b>,
+    limits: ClimbParams,
+}
+
+impl<'c, 'b> Ascent<'c, 'b> {
+    /// Climbs for use alone. Starts race: the first that withstands enough ends it.
+    pub fn of_use(
+        ctx: &'c Ctx<'c>,
+        rules: ClimbRules<'c>,
+        bench: &'b Bench<'b>,
+        starts: &[RankedPlan],
+    ) -> Result<Self, ClimbError> {
+        let limits = rules.params;
+        let mut climber = Climber {
+            ctx,
+            bench,
+            rules,
+            n_plans: 0,
+            n_solves: 0,
+            is_cut_short: false,
+            floors: vec![0.0; bench.ranks.len()],
+        };
+        let starts = climber.best_starts(starts, limits.n_starts)?;
+        let n = starts.len();
+        let mut best: Option<Rated<'b>> = None;
+        for (i, start) in starts.into_iter().enumerate() {
+            // Each start gets its share of the remaining solves.
+            let left = limits.n_of_use.saturating_sub(climber.n_solves);
+            let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
+            if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
+                best = Some(top);
+            }
+            if best.as_ref().is_some_and(Rated::bears_enough) {
+                break;
+            }
         }
+        Ok(Self {
+            climber,
+            best: best.ok_or(ClimbError::NoPlan)?,
+            limits,
+        })
     }
-    let mut best = best.ok_or(ClimbError::NoPlan)?;
-    for rank in [Rank::Pull, Rank::Fall] {
-        best = climber.ascend(best, rank, params.until(rank))?;
+
+    /// Climbs for the other goals, without loss in use.
+    pub fn finish(mut self) -> Result<Climbed<'b>, ClimbError> {
+        let climber = &mut self.climber;
+        let mut best = self.best;
+        for (rank, n_solves) in [
+            (Rank::Pull, self.limits.n_of_pull),
+            (Rank::Fall, self.limits.n_of_falls),
+        ] {
+            best = climber.ascend(best, rank, climber.n_solves + n_solves)?;
+        }
+        climber.complete(&mut best, Rank::Hang)?;
+        Ok(Climbed {
+            best,
+            n_plans: climber.n_plans,
+            n_solves: climber.n_solves,
+            is_cut_short: climber.is_cut_short,
+        })
     }
-    climber.complete(&mut best, Rank::Hang)?;
-    Ok(Climbed {
-        best,
-        n_plans: climber.n_plans,
-        n_solves: climber.n_solves,
-        is_cut_short: climber.is_cut_short,
-    })
 }
 
 /// Returns true if `a` is stronger than `b`: in the first goal of that rank, from the worst on, in which they
@@ -145,14 +183,23 @@ fn is_above(a: &Rated<'_>, b: &Rated<'_>, rank: Rank) -> bool {
     rank == Rank::Use && is_above(a, b, Rank::Pull)
 }
 
+/// Load factor that must be kept of a goal that reached `reached`, for the sake of less important goals. No use
+/// falls below what is asked of it.
+fn floor(reached: f64, rank: Rank) -> f64 {
+    let kept = LEAST_OF_PEAK * reached;
+    if rank == Rank::Use && reached >= RESERVE {
+        kept.max(RESERVE)
+    } else {
+        kept
+    }
+}
+
 struct Climber<'c, 'b> {
     ctx: &'c Ctx<'c>,
     bench: &'b Bench<'b>,
-    around: &'c Neighbourhood<'c>,
-    may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
+    rules: ClimbRules<'c>,
     n_plans: usize,
     n_solves: usize,
-    reserve_s: f64,
     is_cut_short: bool,
     /// Least load factor to keep of each goal of the ranks that were climbed.
     floors: Vec<f64>,
@@ -162,7 +209,7 @@ impl<'b> Climber<'_, 'b> {
     /// The starts with the greatest load factors of their worst uses, best first.
     fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
         let allowed: Vec<RankedPlan> = (starts.par_iter())
-            .filter_map(|start| self.around.rank(start.plan.clone()))
+            .filter_map(|start| self.rules.around.rank(start.plan.clone()))
             .collect();
         let Some((first, others)) = allowed.split_first() else {
             return Err(ClimbError::NoPlan);
@@ -173,7 +220,7 @@ impl<'b> Climber<'_, 'b> {
         let mut best = vec![first];
         for batch in others.chunks(BATCH) {
             self.ctx.check()?;
-            if self.is_time_over() {
+            if best[0].bears_enough() || self.is_time_over() {
                 break;
             }
             // The least load factor of the last start kept is the bar for further starts.
@@ -199,7 +246,7 @@ impl<'b> Climber<'_, 'b> {
 
     /// Returns true if no more than the reserve is left of a limited time, and keeps that in mind.
     fn is_time_over(&mut self) -> bool {
-        self.is_cut_short |= self.ctx.seconds_left() < self.reserve_s;
+        self.is_cut_short |= self.ctx.seconds_left() < self.rules.params.reserve_s;
         self.is_cut_short
     }
 
@@ -254,7 +301,7 @@ impl<'b> Climber<'_, 'b> {
             peak = peak.max(at.least_of(rank));
         }
         for goal in self.bench.goals(rank) {
-            self.floors[goal] = LEAST_OF_PEAK * at.factor(goal).min(rank.enough());
+            self.floors[goal] = floor(at.factor(goal).min(rank.enough()), rank);
         }
         Ok(at)
     }
@@ -298,11 +345,11 @@ impl<'b> Climber<'_, 'b> {
         most_solves: usize,
     ) -> Result<Option<Rated<'b>>, ClimbError> {
         let asked = self.requests(at, rank, order, place, floor);
-        let mut seen = BTreeSet::from([self.around.name(&at.candidate.plan)]);
+        let mut seen = BTreeSet::from([self.rules.around.name(&at.candidate.plan)]);
         for pieces in self.movers(at, order[place]) {
             let mut moves = Vec::new();
             for piece in pieces {
-                moves.extend(self.around.moves(&at.candidate.plan, piece, &mut seen));
+                moves.extend(self.rules.around.moves(&at.candidate.plan, piece, &mut seen));
             }
             for batch in self.select_moves(moves).chunks(BATCH) {
                 self.ctx.check()?;
@@ -330,7 +377,7 @@ impl<'b> Climber<'_, 'b> {
                 }
             });
             let plan = plans.remove(best);
-            if (self.may_be)(&plan.candidate) {
+            if (self.rules.may_be)(&plan.candidate) {
                 return Some(plan);
             }
         }
@@ -356,8 +403,8 @@ impl<'b> Climber<'_, 'b> {
 
     /// The `moves` that keep all conditions, with their costs.
     fn select_moves(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
-        let ranked: Vec<Option<RankedPlan>> =
-            moves.into_par_iter().map(|plan| self.around.rank(plan)).collect();
+        let around = self.rules.around;
+        let ranked: Vec<Option<RankedPlan>> = moves.into_par_iter().map(|plan| around.rank(plan)).collect();
         ranked.into_iter().flatten().collect()
     }
 }

@@ -37,11 +37,8 @@ pub struct Foresight {
 impl Foresight {
     /// Predicts the play for those plans of `found` that cost little enough.
     pub fn of(choice: &Choice<'_>, found: &FoundPlan) -> Self {
-        let model = PlanModel::new(
-            &MetricParams::of_plan(choice.params, choice.sizes, choice.handling.material),
-            choice.surface,
-            choice.sizes,
-        );
+        let params = MetricParams::of_plan(choice.params, choice.sizes, choice.handling.material);
+        let model = PlanModel::of_even(&params, choice.even, choice.sizes);
         let most_cost = found.score.worst * (1.0 + COST_SLACK);
         let mut foresight = Self {
             model,

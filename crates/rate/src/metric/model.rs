@@ -121,14 +121,22 @@ struct StationSeam {
     ends: [Vec3; 2],
 }
 
-impl PlanModel {
-    /// Remeshes `surface` evenly and finds the stations: all points inside seams. `params` must have no
-    /// [`problems`](MetricParams::problems).
-    pub fn new(params: &MetricParams, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> Self {
+/// A divided surface with even triangles, which all models of the same pieces share.
+#[derive(Clone, Debug)]
+pub struct EvenSurface {
+    mesh: TriMesh,
+    labels: Vec<u32>,
+    n_parts: usize,
+}
+
+impl EvenSurface {
+    /// Remeshes `surface` to triangles with edges of about `edge_share` times the usual length, see
+    /// [`MetricParams::edge_share`].
+    pub fn new(surface: &SegmentedSurface, edge_share: f64) -> Self {
         /// Points of the mesh with `edge_share` 1; equilateral triangles have one for each √3/2 l².
         const POINTS_AT_ONE: f64 = 1000.0;
         let area_mm2 = surface.mesh.area();
-        let target_edge_mm = params.edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
+        let target_edge_mm = edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
         let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let mut coarse = remesh(
             &RemeshParams {
@@ -139,13 +147,25 @@ impl PlanModel {
             &labels,
         );
         split_short_seams(&mut coarse);
-        Self::of_mesh(
-            params,
-            &relax_folds(coarse.mesh),
-            &coarse.labels,
-            surface.n_patches,
-            sizes,
-        )
+        Self {
+            mesh: relax_folds(coarse.mesh),
+            labels: coarse.labels,
+            n_parts: surface.n_patches,
+        }
+    }
+}
+
+impl PlanModel {
+    /// Remeshes `surface` evenly and builds the model. `params` must have no
+    /// [`problems`](MetricParams::problems).
+    pub fn new(params: &MetricParams, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> Self {
+        Self::of_even(params, &EvenSurface::new(surface, params.edge_share), sizes)
+    }
+
+    /// Finds the stations of an even surface: all points inside seams. `params` must have no
+    /// [`problems`](MetricParams::problems); their length of edges is that of the surface.
+    pub fn of_even(params: &MetricParams, even: &EvenSurface, sizes: &ConnectorSizes) -> Self {
+        Self::of_mesh(params, &even.mesh, &even.labels, even.n_parts, sizes)
     }
 
     /// Builds the model of a closed mesh with these labels, without remeshing.

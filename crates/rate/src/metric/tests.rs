@@ -190,6 +190,8 @@ fn choose_for(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) 
     let choice = Choice {
         params,
         surface,
+        even: &EvenSurface::new(surface, 1.0),
+        former: None,
         sizes,
         survey,
         constraints,

@@ -4,11 +4,10 @@ use shellock_geom::sparse::SparseError;
 use shellock_plan::sizes::{ChosenSizes, ConnectorSizes};
 use shellock_plan::{PlanParams, RankedPlan};
 use shellock_report::PatchId;
-use shellock_surface::SegmentedSurface;
 
 use super::choice::{LoadBorne, bears};
 use super::rating::{Bench, Rank};
-use super::{MetricParams, PlanModel};
+use super::{EvenSurface, MetricParams, PlanModel};
 use crate::handling::Handling;
 
 /// Changes aim at the load factor that is asked plus this, since they lead to another plan.
@@ -26,8 +25,8 @@ const WALLS_A_MM: f64 = 10.0;
 pub struct WhatIf<'a> {
     /// Parameters of the plan's search.
     pub params: &'a PlanParams,
-    /// Surface divided into the pieces.
-    pub surface: &'a SegmentedSurface,
+    /// Surface divided into the pieces, with even triangles.
+    pub even: &'a EvenSurface,
     /// Present sizes of connectors.
     pub sizes: &'a ChosenSizes,
     /// Loads of everyday use, with the present wall.
@@ -114,7 +113,7 @@ impl WhatIf<'_> {
             ..*self.handling
         };
         let metric = MetricParams::of_plan(params, sizes, handling.material);
-        let model = PlanModel::new(&metric, self.surface, sizes);
+        let model = PlanModel::of_even(&metric, self.even, sizes);
         let bench = Bench::of_uses(handling, &model)?;
         let mut rated = bench.begun(self.plan.clone(), None)?;
         for goal in bench.goals(Rank::Use) {

@@ -26,6 +26,7 @@ use super::cost::Cost;
 use super::ways::{Input, Walls, Way, ways};
 use super::{Params, Rounds, Thickness};
 use crate::Ctx;
+use crate::metric::RESERVE;
 use crate::sizes::SizeChoice;
 
 /// Number of places at which a key is cut before a piece becomes the key: if the best place fails, others
@@ -33,10 +34,8 @@ use crate::sizes::SizeChoice;
 pub(super) const CUT_KEYS: usize = 3;
 /// Keys whose kits fail by rattling alone, after which no others are tried: another key changes little.
 const RATTLING_KEYS: usize = 2;
-/// Load factor that kits are asked for. The surface model knows no play, so a reserve stands for that
-/// (docs/notes/stress-test.md). If no kit passes with the wall that this takes, [`ONCE`] is asked.
-const RESERVE: f64 = 1.4;
-/// Load factor at which a kit withstands its loads, but has no reserve.
+/// Load factor at which a kit withstands its loads, but has no reserve. It is asked for if no kit passes with
+/// the wall that [`RESERVE`] takes.
 const ONCE: f64 = 1.0;
 /// Bounds of every way to divide but the last one.
 const ROUNDS_BESIDE_OTHERS: Rounds = Rounds {

@@ -13,9 +13,9 @@ use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
 use crate::handling::Handling;
 use crate::key::Turn;
-use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
+use crate::metric::{Choice, Chosen, ClimbParams, EvenSurface, Foresight, LoadBorne, MetricParams};
 use crate::plan::lesson::Lesson;
-use crate::plan::{Blocker, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey, RankedPlan};
 use crate::segmentation::join;
 use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
 
@@ -105,25 +105,22 @@ pub(super) fn make_kit(
     let Setup {
         candidate,
         division,
+        even,
         grid,
         survey,
         lessons,
+        former,
     } = setup;
     let planning = Planning {
         input: job.input,
         turn: &candidate.turn,
         division,
+        even: even_surface(even, division),
         survey: survey.as_ref().expect("plans were surveyed"),
         constraints: &lessons.constraints,
     };
-    let (params, model, surface) = (&division.settings.body, &*candidate.model, &division.surface);
-    // The proof of a plan runs on one thread; the grid and the distances in it are made beside it.
-    let (measured, next) = rayon::join(
-        || grid.measure(params, model, surface),
-        || next_plan(&kit_ctx, &planning, allowance),
-    );
-    let (grid, distances) = measured?;
-    let (chosen, late) = match plan_or_changes(ctx, division, lessons, next?, allowance)? {
+    let next = next_plan(&kit_ctx, &planning, allowance, former)?;
+    let (chosen, late) = match plan_or_changes(ctx, division, lessons, next, allowance)? {
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
@@ -131,6 +128,8 @@ pub(super) fn make_kit(
     if ctx.seconds_left() < allowance.least_kit_s {
         return Err(DesignError::Cancelled(Cancelled));
     }
+    let (params, model) = (&division.settings.body, &*candidate.model);
+    let (grid, distances) = grid.measure(params, model, &division.surface)?;
     let is_hurried = chosen.is_cut_short;
     let recipe = Recipe {
         params: job.input.params,
@@ -310,6 +309,8 @@ pub(super) struct Planning<'a> {
     /// Turn of the model for the division.
     pub turn: &'a Turn,
     pub division: &'a Division,
+    /// The division's surface with even triangles.
+    pub even: &'a EvenSurface,
     pub survey: &'a PlanSurvey,
     pub constraints: &'a PlanConstraints,
 }
@@ -326,10 +327,16 @@ impl Planning<'_> {
     /// Criteria by which plans are compared.
     ///
     /// A climb keeps `reserve_s` back for the kit.
-    pub fn choice<'b>(&'b self, handling: &'b Handling, reserve_s: f64) -> Choice<'b> {
+    pub fn choice<'b>(
+        &'b self,
+        handling: &'b Handling,
+        former: Option<&'b LatticePlan>,
+        reserve_s: f64,
+    ) -> Choice<'b> {
         Choice {
             params: &self.division.settings.plan,
             surface: &self.division.surface,
+            even: self.even,
             sizes: &self.division.sizes.sizes,
             survey: self.survey,
             constraints: self.constraints,
@@ -338,8 +345,14 @@ impl Planning<'_> {
                 reserve_s,
                 ..ClimbParams::default()
             },
+            former,
         }
     }
+}
+
+/// Returns the division's surface with even triangles, which is made when first needed.
+fn even_surface<'a>(even: &'a mut Option<EvenSurface>, division: &Division) -> &'a EvenSurface {
+    even.get_or_insert_with(|| EvenSurface::new(&division.surface, MetricParams::default().edge_share))
 }
 
 /// Seeks the plan that a kit would be made of, without making it.
@@ -359,10 +372,11 @@ pub(super) fn seek_plan(
         input: job.input,
         turn: &setup.candidate.turn,
         division,
+        even: even_surface(&mut setup.even, division),
         survey: setup.survey.as_ref().expect("plans were surveyed"),
         constraints: &setup.lessons.constraints,
     };
-    let next = next_plan(&plan_ctx, &planning, allowance)?;
+    let next = next_plan(&plan_ctx, &planning, allowance, &mut setup.former)?;
     Ok(
         match plan_or_changes(ctx, division, &setup.lessons, next, allowance)? {
             Ok((chosen, late)) => {
@@ -381,11 +395,13 @@ pub(super) fn seek_plan(
     )
 }
 
-/// Seeks the next plan of a division to make.
+/// Seeks the next plan of a division to make. The climb starts from the `former` strongest plan of the same
+/// pieces, too; a plan that is given up for a change takes its place.
 pub(super) fn next_plan(
     ctx: &Ctx,
     planning: &Planning<'_>,
     allowance: &Allowance,
+    former: &mut Option<LatticePlan>,
 ) -> Result<Next, DesignError> {
     let division = planning.division;
     let Division {
@@ -413,7 +429,8 @@ pub(super) fn next_plan(
         }
     };
     let handling = planning.handling();
-    let choice = planning.choice(&handling, allowance.kit_reserve_s);
+    let of_other_sizes = former.take();
+    let choice = planning.choice(&handling, of_other_sizes.as_ref(), allowance.kit_reserve_s);
     ctx.stage("expected play", 0)?;
     let foresight = Foresight::of(&choice, &found);
     let mut late = None;
@@ -429,18 +446,25 @@ pub(super) fn next_plan(
             return Ok(Next::Changes(vec![change], None));
         }
     }
-    let best = metric::choose(ctx, &choice, &foresight, *found)?;
+    let or_changes = |plan: &RankedPlan, bears: &[LoadBorne]| {
+        *former = Some(plan.plan.clone());
+        match strengthen(ctx, planning, &handling, (plan, bears), allowance) {
+            Ok((changes, late_change)) => {
+                late = late.or(late_change);
+                (!changes.is_empty()).then_some(Ok(changes))
+            }
+            Err(e) => Some(Err(e)),
+        }
+    };
+    let best = match metric::choose_or_change(ctx, &choice, &foresight, *found, or_changes)? {
+        Ok(best) => best,
+        Err(changes) => return Ok(Next::Changes(changes?, late)),
+    };
     if settings.plan.key_slide.is_none() {
         let (plan, largest_mm) = (&best.search_result.plan, division.sizes.sizes.largest_mm());
         let slide = plan.separation(plan.key()).unit();
         let may_be_cut = !planning.input.params.key.is_cut();
         key::warn_of_conditions(ctx, surface, (plan.key(), slide), largest_mm, may_be_cut);
     }
-    let plan = (&best.search_result.pool[0], &best.holding);
-    let (changes, late_change) = strengthen(ctx, planning, &handling, plan, allowance)?;
-    let late = late.or(late_change);
-    Ok(match changes.is_empty() {
-        true => Next::Plan(Box::new(best), late),
-        false => Next::Changes(changes, late),
-    })
+    Ok(Next::Plan(Box::new(best), late))
 }

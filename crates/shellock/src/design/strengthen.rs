@@ -11,10 +11,13 @@ use super::division::Division;
 use super::trial::Change;
 use super::wall::Thicker;
 use crate::handling::Handling;
-use crate::metric::{ChoiceError, Holding, LoadBorne, WhatIf, is_worth, weakest_use};
+use crate::metric::{ChoiceError, LoadBorne, WhatIf, is_worth, weakest_use};
 use crate::plan::RankedPlan;
 use crate::{Ctx, PatchId, Warning, segmentation, strength};
 
+/// Share of the load factor that is asked for, below which changes are sought: what is missing is less than
+/// what the model knows.
+const TOLERANCE: f64 = 0.99;
 /// Load factor below which a kit fails under its load. Only then are pieces joined.
 const ONCE: f64 = 1.0;
 
@@ -24,24 +27,24 @@ pub(super) fn strengthen(
     ctx: &Ctx,
     planning: &Planning<'_>,
     handling: &Handling,
-    (chosen, holding): (&RankedPlan, &Holding),
+    (chosen, bears): (&RankedPlan, &[LoadBorne]),
     allowance: &Allowance,
 ) -> Result<(Vec<Change>, Option<Step>), DesignError> {
     let (division, asked) = (planning.division, allowance.least_factor);
-    let Some((weakest, before)) = weakest_use(&holding.bears, asked) else {
+    let Some((weakest, before)) = weakest_use(bears, TOLERANCE * asked) else {
         return Ok((Vec::new(), None));
     };
     ctx.stage("reinforcements", 0)?;
     let rating = WhatIf {
         params: &division.settings.plan,
-        surface: &division.surface,
+        even: planning.even,
         sizes: &division.sizes,
         handling,
         plan: chosen,
         least_factor: asked,
     };
     let larger = match allowance.is_allowed(Step::Enlarge) {
-        true => Some(rating.enlarge(&holding.bears).map_err(ChoiceError::from)?),
+        true => Some(rating.enlarge(bears).map_err(ChoiceError::from)?),
         false => None,
     };
     if let Some((sizes, borne)) = &larger
@@ -113,7 +116,7 @@ mod tests {
     use crate::LatticeDirection;
     use crate::design::candidate::Candidate;
     use crate::handling::{Deed, Failure};
-    use crate::metric::GivesWay;
+    use crate::metric::{EvenSurface, GivesWay};
     use crate::plan::{LatticePlan, PlanConstraints, PlanScore, survey};
 
     const N: usize = 4;
@@ -158,24 +161,17 @@ mod tests {
         let (settings, surface) = (&division.settings.plan, &division.surface);
         let sizes = &division.sizes.sizes;
         let survey = survey(&ctx, settings, surface, &surface.seams(), sizes).expect("not stopped");
+        let even = EvenSurface::new(surface, 1.0);
         let planning = Planning {
+            even: &even,
             input: ball.input(),
             turn: &candidate.turn,
             division: &division,
             survey: &survey,
             constraints: &PlanConstraints::default(),
         };
-        let holding = Holding {
-            quality_mm: None,
-            loose: Vec::new(),
-            seams: Vec::new(),
-            n_compared: 1,
-            bears: vec![press(borne)],
-            foreseen_play: Vec::new(),
-            foreseen_excess: Vec::new(),
-        };
         let allowance = Agenda::new(&ctx, &ball.input()).allowance(&ctx).only(steps);
-        let plan = (&plan(), &holding);
+        let plan = (&plan(), &[press(borne)][..]);
         let found = strengthen(&ctx, &planning, &planning.handling(), plan, &allowance);
         let (changes, late) = found.expect("not stopped");
         (changes.iter().map(Change::step).collect(), late)

@@ -15,8 +15,9 @@ use super::ways::{Input, Walls, Way};
 use super::{DesignError, KeySource, Settings};
 use crate::body::WallGrid;
 use crate::key::{FaceSet, KeySite};
+use crate::metric::EvenSurface;
 use crate::plan::lesson::Lesson;
-use crate::plan::{self, PlanConstraints, PlanSurvey};
+use crate::plan::{self, LatticePlan, PlanConstraints, PlanSurvey};
 use crate::sizes::ChosenSizes;
 use crate::strength::StressMap;
 use crate::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
@@ -123,9 +124,13 @@ impl Learned {
 pub(super) struct Setup<'a> {
     pub candidate: Candidate<'a>,
     pub division: Division,
+    /// Surface of the division with even triangles, once it is needed.
+    pub even: Option<EvenSurface>,
     pub grid: WallGrid,
     pub survey: Option<PlanSurvey>,
     pub lessons: Learned,
+    /// Strongest plan of the present pieces with other connectors.
+    pub former: Option<LatticePlan>,
 }
 
 /// Layers of a trial that kits are made from.
@@ -230,7 +235,7 @@ impl<'a> Trial<'a> {
                 ctx.note("seams would open where it is used: larger connectors there");
                 if let Some(setup) = &mut self.setup {
                     setup.division.sizes = sizes;
-                    setup.begin_division();
+                    setup.begin_sizes();
                 }
                 Ok(None)
             }
@@ -294,9 +299,11 @@ impl<'a> Trial<'a> {
         let mut setup = Setup {
             candidate,
             division,
+            even: None,
             grid: WallGrid::default(),
             survey: None,
             lessons: Learned::default(),
+            former: None,
         };
         setup.begin_division();
         self.setup = Some(setup);
@@ -363,9 +370,15 @@ impl Setup<'_> {
         Ok(())
     }
 
-    /// Forgets lessons and measurements of other pieces, and makes sure that connectors will
-    /// have room.
+    /// Forgets measurements and lessons of other pieces.
     fn begin_division(&mut self) {
+        (self.even, self.former) = (None, None);
+        self.grid.begin_division();
+        self.begin_sizes();
+    }
+
+    /// Forgets lessons of other connectors, and makes sure that the present ones will have room.
+    fn begin_sizes(&mut self) {
         let Division {
             settings,
             sizes: chosen,
@@ -373,6 +386,6 @@ impl Setup<'_> {
         } = &self.division;
         (self.survey, self.lessons) = (None, Learned::default());
         self.grid
-            .begin_division(settings.connector.room_mm(chosen.sizes.largest_mm()));
+            .reserve(settings.connector.room_mm(chosen.sizes.largest_mm()));
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use shellock::design::Settings;
 use shellock::handling::{Deed, Handling, LoadCase, load_factor};
-use shellock::metric::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
+use shellock::metric::{Bench, ClimbError, ClimbParams, ClimbRules, Climbed, Rated, climb};
 use shellock::plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanOutcome, PlanParams, random_plans, search,
 };
@@ -39,12 +39,15 @@ pub fn sheets(
     let bench = Bench::new(handling, &subject.model).map_err(unsolved)?;
     let first = bench.rate(found.pool[0].clone()).map_err(unsolved)?;
     let start = Instant::now();
-    let budget = ClimbParams {
-        n_solves,
-        ..Default::default()
+    let rules = ClimbRules {
+        params: ClimbParams {
+            n_of_use: n_solves,
+            ..Default::default()
+        },
+        around: &around,
+        may_be: &|_| true,
     };
-    let top = climb(&ctx, budget, &bench, &around, &found.pool, &|_| true)
-        .map_err(|e: ClimbError| failed("climb", &e))?;
+    let top = climb(&ctx, rules, &bench, &found.pool).map_err(|e: ClimbError| failed("climb", &e))?;
     let pace = pace(&top, start.elapsed().as_secs_f64());
     eprintln!(
         "{pace}; cost {:.3}, least {:.3}",

@@ -83,7 +83,7 @@ fn elements_of_others_are_passed_over_with_all_that_is_in_them() {
     );
     let loaded = read_part(&proxy);
     assert_eq!(loaded.mesh, expected.mesh);
-    assert_note(&loaded, "elements that are not read: proxy");
+    assert_note(&loaded, "unsupported elements: proxy");
     let bare = part(
         r#"<object id="1"><x:newshape/></object>"#,
         r#"<item objectid="1"/>"#,

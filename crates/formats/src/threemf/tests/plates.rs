@@ -49,7 +49,7 @@ fn instances_that_are_switched_off_count_where_a_plate_names_instances() {
     assert_eq!(names, ["base", "figure"]);
     let bounds = second.mesh.bounds();
     assert_eq!((bounds.min.x, bounds.max.x), (100.0, 210.0));
-    assert_note(&second, "not to print: 1; left out");
+    assert_note(&second, "excluded from printing in the slicer: 1; left out");
     assert_note(&second, "2 of 2 objects or parts were taken");
     let first = choose(&bytes, None, Some("1")).unwrap_err().to_string();
     assert!(
