@@ -82,6 +82,9 @@ pub(crate) struct Limits<'a> {
     n: usize,
     n_rows: usize,
     all: Vec<Limit>,
+    /// Wrenches of the contact rows by coordinate, for the motion of a single piece: all rows are scanned in
+    /// each round.
+    of_single: Option<[Vec<f64>; 6]>,
     /// Late bound of a row, mm, infinite for none. Without it, bounds are those of `all`.
     late: Option<&'a LateBound<'a>>,
 }
@@ -118,14 +121,47 @@ impl<'a> Limits<'a> {
             }
         };
         let contacts = system.rows.iter().zip(gaps_mm).enumerate().map(contact);
-        let all = contacts.chain((0..2 * n).map(side)).collect();
+        let all: Vec<Limit> = contacts.chain((0..2 * n).map(side)).collect();
+        let n_rows = system.rows.len();
         Self {
             n,
-            n_rows: system.rows.len(),
+            n_rows,
+            of_single: (n == 6).then(|| wrenches_of_single(&all[..n_rows])),
             all,
             late: None,
         }
     }
+
+    /// Value of each contact row's linear form for a motion.
+    fn along_all(&self, motion: &[f64]) -> Vec<f64> {
+        let Some([a, b, c, d, e, f]) = &self.of_single else {
+            let rows = &self.all[..self.n_rows];
+            return rows.iter().map(|limit| limit.along(motion)).collect();
+        };
+        let x: [f64; 6] = std::array::from_fn(|k| motion[k]);
+        // Plain zips, so that several rows are computed at once.
+        let first = a
+            .iter()
+            .zip(b)
+            .zip(c)
+            .map(|((a, b), c)| a * x[0] + b * x[1] + c * x[2]);
+        let then = first.zip(d).map(|(sum, d)| sum + d * x[3]);
+        let rows = then.zip(e).zip(f).map(|((sum, e), f)| sum + e * x[4] + f * x[5]);
+        rows.collect()
+    }
+}
+
+/// Wrenches of rows that limit a single piece, by coordinate; a row that the piece is the second of has the
+/// opposite sign.
+fn wrenches_of_single(rows: &[Limit]) -> [Vec<f64>; 6] {
+    let signed = |row: &Limit, k: usize| {
+        if row.plus == 0 {
+            row.wrench[k]
+        } else {
+            -row.wrench[k]
+        }
+    };
+    std::array::from_fn(|k| rows.iter().map(|row| signed(row, k)).collect())
 }
 
 /// Number in [0.5, 1) for each `i`, irregularly distributed: the fractions of multiples of the golden ratio.
@@ -364,9 +400,9 @@ impl<'a> Corner<'a> {
     /// limit the motion equally. Returns true if there was any that had not been examined before.
     fn look_at_overdrawn(&mut self) -> bool {
         let mut overdrawn = BTreeMap::<(usize, usize), Vec<(f64, usize)>>::new();
-        for i in (0..self.is_looked_at.len()).filter(|&i| !self.is_looked_at[i]) {
-            let room_mm = self.room_mm(i);
-            if room_mm < -OVERDRAWN_MM {
+        for (i, along) in self.limits.along_all(&self.x).into_iter().enumerate() {
+            let room_mm = self.bounds_mm[i] - along;
+            if room_mm < -OVERDRAWN_MM && !self.is_looked_at[i] {
                 let Limit { plus, minus, .. } = self.limits.all[i];
                 overdrawn.entry((plus, minus)).or_default().push((room_mm, i));
             }

@@ -327,7 +327,10 @@ fn strongest<'b, T>(
     let counted = found.apply_counts(choice.survey);
     let around = &Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
     let may_be = &|p: &RankedPlan| foresight.is_steady(&p.plan);
-    let former = choice.former.and_then(|plan| around.rank(plan.clone()));
+    let is_like =
+        |plan: &&LatticePlan| plan.steps.len() == found.plan.steps.len() && plan.key() == found.plan.key();
+    let of_this_key = choice.former.filter(is_like);
+    let former = of_this_key.and_then(|plan| around.rank(plan.clone()));
     let mut starts: Vec<RankedPlan> = former.into_iter().filter(may_be).collect();
     starts.extend(foresight.steady());
     let params = choice.climb;

@@ -25,6 +25,8 @@ const BATCH: usize = 8;
 /// Ratios of load factors from which on one counts as more, and as no less.
 const MORE: f64 = 1.01;
 const NO_LESS: f64 = 0.99;
+/// Number of loads that each start may solve in the first heat of the race.
+const FIRST_HEAT: usize = 120;
 /// Share of the best value reached of a goal that must be kept for the sake of less important goals.
 const LEAST_OF_PEAK: f64 = 0.97;
 
@@ -130,22 +132,9 @@ impl<'c, 'b> Ascent<'c, 'b> {
             floors: vec![0.0; bench.ranks.len()],
         };
         let starts = climber.best_starts(starts, limits.n_starts)?;
-        let n = starts.len();
-        let mut best: Option<Rated<'b>> = None;
-        for (i, start) in starts.into_iter().enumerate() {
-            // Each start gets its share of the remaining solves.
-            let left = limits.n_of_use.saturating_sub(climber.n_solves);
-            let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
-            if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
-                best = Some(top);
-            }
-            if best.as_ref().is_some_and(Rated::bears_enough) {
-                break;
-            }
-        }
         Ok(Self {
+            best: climber.race(starts, limits.n_of_use)?,
             climber,
-            best: best.ok_or(ClimbError::NoPlan)?,
             limits,
         })
     }
@@ -154,11 +143,13 @@ impl<'c, 'b> Ascent<'c, 'b> {
     pub fn finish(mut self) -> Result<Climbed<'b>, ClimbError> {
         let climber = &mut self.climber;
         let mut best = self.best;
+        climber.keep(&best, Rank::Use);
         for (rank, n_solves) in [
             (Rank::Pull, self.limits.n_of_pull),
             (Rank::Fall, self.limits.n_of_falls),
         ] {
-            best = climber.ascend(best, rank, climber.n_solves + n_solves)?;
+            (best, _) = climber.ascend(best, rank, climber.n_solves + n_solves)?;
+            climber.keep(&best, rank);
         }
         climber.complete(&mut best, Rank::Hang)?;
         Ok(Climbed {
@@ -282,16 +273,57 @@ impl<'b> Climber<'_, 'b> {
         Ok(all.into_iter().filter_map(|t| t.0).collect())
     }
 
-    /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. The load
-    /// factors reached become floors for the ranks that follow.
-    fn ascend(&mut self, start: Rated<'b>, rank: Rank, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
+    /// Climbs from all starts for use, in heats: after each, the worse half drops out and the others may solve
+    /// twice as many loads. The first that withstands enough wins.
+    fn race(&mut self, starts: Vec<Rated<'b>>, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
+        let mut runners: Vec<(Rated<'b>, bool)> = starts.into_iter().map(|start| (start, false)).collect();
+        let mut n_each = FIRST_HEAT;
+        loop {
+            for (at, is_top) in runners.iter_mut().filter(|runner| !runner.1) {
+                let until = most_solves.min(self.n_solves + n_each);
+                (*at, *is_top) = self.ascend(at.clone(), Rank::Use, until)?;
+                if at.bears_enough() {
+                    return Ok(at.clone());
+                }
+            }
+            let is_over = self.n_solves >= most_solves || self.is_cut_short;
+            let left = match is_over || runners.iter().all(|runner| runner.1) {
+                true => 1,
+                false => runners.len().div_ceil(2),
+            };
+            while runners.len() > left {
+                let worst = (1..runners.len()).fold(0, |worst, i| {
+                    let is_above = is_above(&runners[i].0, &runners[worst].0, Rank::Use);
+                    if is_above { worst } else { i }
+                });
+                runners.remove(worst);
+            }
+            match runners.pop() {
+                Some((best, is_top)) if runners.is_empty() && (is_over || is_top) => return Ok(best),
+                Some(last) => runners.push(last),
+                None => return Err(ClimbError::NoPlan),
+            }
+            n_each *= 2;
+        }
+    }
+
+    /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. Returns the
+    /// plan, and true in the first case.
+    fn ascend(
+        &mut self,
+        start: Rated<'b>,
+        rank: Rank,
+        most_solves: usize,
+    ) -> Result<(Rated<'b>, bool), ClimbError> {
         let mut at = start;
+        let mut is_top = false;
         self.complete(&mut at, rank)?;
         let mut peak = at.least_of(rank);
         let mut place = 0;
         while self.n_solves < most_solves && !self.is_time_over() {
             let order = at.worst_first(rank);
             if place >= order.len() {
+                is_top = true;
                 break;
             }
             match self.step(&at, rank, &order[..], place, LEAST_OF_PEAK * peak, most_solves)? {
@@ -300,10 +332,14 @@ impl<'b> Climber<'_, 'b> {
             }
             peak = peak.max(at.least_of(rank));
         }
+        Ok((at, is_top))
+    }
+
+    /// Makes the load factors of a plan floors for the ranks that follow.
+    fn keep(&mut self, at: &Rated<'b>, rank: Rank) {
         for goal in self.bench.goals(rank) {
             self.floors[goal] = floor(at.factor(goal).min(rank.enough()), rank);
         }
-        Ok(at)
     }
 
     /// Goals and least load factors of a move that improves the goal at `place` of `order`. That goal comes

@@ -448,6 +448,7 @@ pub(super) fn next_plan(
     }
     let or_changes = |plan: &RankedPlan, bears: &[LoadBorne]| {
         *former = Some(plan.plan.clone());
+        ctx.note(&words_of_least(bears, allowance.least_factor));
         match strengthen(ctx, planning, &handling, (plan, bears), allowance) {
             Ok((changes, late_change)) => {
                 late = late.or(late_change);
@@ -467,4 +468,11 @@ pub(super) fn next_plan(
         key::warn_of_conditions(ctx, surface, (plan.key(), slide), largest_mm, may_be_cut);
     }
     Ok(Next::Plan(Box::new(best), late))
+}
+
+/// Tells how often a plan withstands its loads, and how often that is asked.
+fn words_of_least(bears: &[LoadBorne], asked: f64) -> String {
+    let uses = bears.iter().filter(|b| b.deed.is_use()).filter_map(|b| b.factor);
+    let least = uses.fold(f64::INFINITY, f64::min);
+    format!("the strongest plan bears {least:.2} times its loads, and {asked:.1} times is asked")
 }
