@@ -273,12 +273,12 @@ impl<'b> Climber<'_, 'b> {
         Ok(all.into_iter().filter_map(|t| t.0).collect())
     }
 
-    /// Climbs from all starts for use, in heats: after each, the worse half drops out and the others may solve
-    /// twice as many loads. The first that withstands enough wins.
+    /// Climbs from all starts for use, in heats: in each, every start may solve twice as many loads as in the
+    /// one before. The first plan that withstands enough wins, else the strongest one in the end.
     fn race(&mut self, starts: Vec<Rated<'b>>, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
         let mut runners: Vec<(Rated<'b>, bool)> = starts.into_iter().map(|start| (start, false)).collect();
         let mut n_each = FIRST_HEAT;
-        loop {
+        while self.n_solves < most_solves && !self.is_cut_short && runners.iter().any(|runner| !runner.1) {
             for (at, is_top) in runners.iter_mut().filter(|runner| !runner.1) {
                 let until = most_solves.min(self.n_solves + n_each);
                 (*at, *is_top) = self.ascend(at.clone(), Rank::Use, until)?;
@@ -286,25 +286,14 @@ impl<'b> Climber<'_, 'b> {
                     return Ok(at.clone());
                 }
             }
-            let is_over = self.n_solves >= most_solves || self.is_cut_short;
-            let left = match is_over || runners.iter().all(|runner| runner.1) {
-                true => 1,
-                false => runners.len().div_ceil(2),
-            };
-            while runners.len() > left {
-                let worst = (1..runners.len()).fold(0, |worst, i| {
-                    let is_above = is_above(&runners[i].0, &runners[worst].0, Rank::Use);
-                    if is_above { worst } else { i }
-                });
-                runners.remove(worst);
-            }
-            match runners.pop() {
-                Some((best, is_top)) if runners.is_empty() && (is_over || is_top) => return Ok(best),
-                Some(last) => runners.push(last),
-                None => return Err(ClimbError::NoPlan),
-            }
             n_each *= 2;
         }
+        let plans = runners.into_iter().map(|runner| runner.0);
+        let strongest = plans.reduce(|best, plan| match is_above(&plan, &best, Rank::Use) {
+            true => plan,
+            false => best,
+        });
+        strongest.ok_or(ClimbError::NoPlan)
     }
 
     /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. Returns the

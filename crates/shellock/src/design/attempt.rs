@@ -129,6 +129,7 @@ pub(super) fn make_kit(
         return Err(DesignError::Cancelled(Cancelled));
     }
     let (params, model) = (&division.settings.body, &*candidate.model);
+    ctx.stage("wall", 0)?;
     let (grid, distances) = grid.measure(params, model, &division.surface)?;
     let is_hurried = chosen.is_cut_short;
     let recipe = Recipe {

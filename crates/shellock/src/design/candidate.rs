@@ -77,7 +77,6 @@ impl<'a> Candidate<'a> {
             settings.plan.key = job.key_of(&surface);
             let chosen = self.sizes(ctx, job, &settings, &surface)?;
             return Ok(Some(Division {
-                uncut: surface.clone(),
                 surface,
                 settings,
                 sizes: chosen,
@@ -85,8 +84,8 @@ impl<'a> Candidate<'a> {
                 changes: Vec::new(),
             }));
         };
-        let uncut = surface;
-        let Some((surface, patch)) = key::imprint_refined(ctx, &given.segmentation, &uncut, &key.site.prism)?
+        let Some((surface, patch)) =
+            key::imprint_refined(ctx, &given.segmentation, &surface, &key.site.prism)?
         else {
             return Ok(None);
         };
@@ -96,7 +95,6 @@ impl<'a> Candidate<'a> {
         chosen.cap(patch, settings.connector.size.usual_mm());
         let grip = job.input.params.has_grip.then(|| key.grip(patch));
         Ok(Some(Division {
-            uncut,
             surface,
             settings,
             sizes: chosen,

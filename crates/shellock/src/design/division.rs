@@ -9,8 +9,6 @@ use crate::{Ctx, SegmentedSurface, Warning, segmentation};
 /// Pieces, and the stages' settings for them.
 pub(super) struct Division {
     pub surface: SegmentedSurface,
-    /// The pieces before the key was cut out of them.
-    pub uncut: SegmentedSurface,
     pub settings: Settings,
     pub sizes: ChosenSizes,
     /// Notch of the key.

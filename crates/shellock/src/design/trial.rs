@@ -52,8 +52,6 @@ pub(super) struct Job<'a> {
     stress: Option<StressMap>,
     /// Triangles of the model that the user wants in the key; `None` if the key is ours to choose.
     key_faces: Option<FaceSet>,
-    /// Warnings of pieces that were joined for the sake of use.
-    changes: Vec<Warning>,
 }
 
 impl<'a> Job<'a> {
@@ -73,23 +71,7 @@ impl<'a> Job<'a> {
             wall,
             surface,
             stress,
-            changes: Vec::new(),
         })
-    }
-
-    /// The present pieces with another wall.
-    fn with_wall(self, wall: Arc<Wall>, setup: Setup<'_>) -> Self {
-        let (back, uncut) = (setup.candidate.turn.inverse(), setup.division.uncut);
-        Self {
-            stress: wall.strength.as_ref().map(StressMap::new),
-            wall,
-            surface: SegmentedSurface {
-                mesh: back.mesh(&uncut.mesh),
-                ..uncut
-            },
-            changes: setup.division.changes,
-            ..self
-        }
     }
 
     /// The patch with the largest share of what the user wants in the key.
@@ -259,20 +241,15 @@ impl<'a> Trial<'a> {
             }
             Change::Divide(step, surface, warning) => self.use_pieces(ctx, agenda, step, surface, warning),
             Change::Thicken(thicker) => {
-                let (job, setup) = self
+                let job = self
                     .job
                     .take()
-                    .zip(self.setup.take())
-                    .expect("a thicker wall is sought for pieces of a model");
+                    .expect("a thicker wall is sought for a model that is divided");
                 ctx.note(&thicker.words());
                 self.forget();
-                let wall = Arc::new(job.wall.thicken(ctx, &self.input, thicker)?);
-                let former = setup.former.clone();
-                let failure = self.use_job(ctx, agenda, job.with_wall(wall, setup))?;
-                if let Some(setup) = &mut self.setup {
-                    setup.former = former;
-                }
-                Ok(failure)
+                let wall = job.wall.thicken(ctx, &self.input, thicker)?;
+                let job = Job::new(ctx, self.input, Arc::new(wall))?;
+                self.use_job(ctx, agenda, job)
             }
         }
     }
@@ -319,10 +296,9 @@ impl<'a> Trial<'a> {
         };
         self.effort.segmentations += 1;
         agenda.foresee(ctx, Cost::of(&division.surface));
-        let changes = job.changes.clone();
         let mut setup = Setup {
             candidate,
-            division: Division { changes, ..division },
+            division,
             even: None,
             grid: WallGrid::default(),
             survey: None,
