@@ -98,8 +98,9 @@ impl Judgement {
     }
 }
 
-/// Judges closed pieces that are installed by a valid plan. Ways out are sought only for a kit that passes all
-/// other checks, since that is slow. If the time is over by then, a warning says which pieces it leaves open.
+/// Judges closed pieces that are installed by a valid plan. Ways out are sought only for a kit that passes
+/// all other checks, since that is slow. If the time is over by then, a warning says which pieces it leaves
+/// open.
 ///
 /// A function of its arguments alone, on any number of threads, as long as time is left.
 pub fn judge(

@@ -118,9 +118,9 @@ impl Shape {
 /// Results of a query for both scopes, which cost little more than one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ByScope<T> {
-    /// Result for [`Scope::Everything`].
+    /// Result of the query for [`Scope::Everything`].
     pub everything: Option<T>,
-    /// Result for [`Scope::WhatCounts`].
+    /// Result of the query for [`Scope::WhatCounts`].
     pub what_counts: Option<T>,
 }
 
@@ -184,7 +184,7 @@ fn gaps_of(shapes: [&Shape; 2], motion: &Translation, within_mm: f64) -> ByScope
     encounter.map_or(nothing, |e| e.nearest(&[Scope::Everything, Scope::WhatCounts]))
 }
 
-/// No motion.
+/// Translation of a shape that stays at rest.
 const REST: Translation = Translation {
     along: Vec3::ZERO,
     from_mm: 0.0,
@@ -315,8 +315,8 @@ impl<'a> Encounter<'a> {
         }
     }
 
-    /// Finds the nearest approach of the surfaces within the limit, for each of `scopes`, in one traversal. If
-    /// the surfaces meet, it is the first meeting found.
+    /// Finds the nearest approach of the surfaces within the limit, for each of `scopes`, in one traversal.
+    /// If the surfaces meet, it is the first meeting found.
     fn approaches(&self, scopes: &[Scope]) -> ByScope<Approach> {
         let ([a, b], travels) = (&self.trees, self.passage.travels);
         let mut best: [Option<Approach>; 2] = [None; 2];

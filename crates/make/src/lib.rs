@@ -1,7 +1,8 @@
 //! Printable pieces of a plan.
 //!
 //! [`mod@body`] builds the wall and splits it along the plan, [`connector`] decides what is under each seam,
-//! and [`piece`] makes the finished meshes; [`make()`] does all three. [`coupon`] makes a pair of small pieces to test the fit.
+//! and [`piece`] makes the finished meshes; [`make()`] does all three. [`coupon`] makes a pair of small
+//! pieces to test the fit.
 
 pub mod body;
 mod causes;

@@ -161,8 +161,8 @@ fn rooms(
 /// Pieces of a pair, the later one first, with the lengths of their connectors and of their seam, mm.
 pub type SeamLengths = ((PatchId, PatchId), [f64; 2]);
 
-/// Finds pairs of pieces whose connectors came out too short to hold them together. Pieces of seams and joints
-/// are those of `plan`.
+/// Finds pairs of pieces whose connectors came out too short to hold them together. Pieces of seams and
+/// joints are those of `plan`.
 pub fn short_connectors<D: Copy>(
     plan: &InstallationPlan<D>,
     sizes: &ConnectorSizes,

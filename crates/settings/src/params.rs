@@ -113,8 +113,8 @@ impl Default for Thickness {
 /// Choice of the key, the piece installed last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
-    /// Cut out of the surface where it slides best, see [`shellock_divide::key`]. If no such kit passes, the key is
-    /// chosen as with `Flattest`.
+    /// Cut out of the surface where it slides best, see [`shellock_divide::key`]. If no such kit passes, the
+    /// key is chosen as with `Flattest`.
     #[default]
     Cut,
     /// Cut out of the surface as near as possible to this point of the model, mm.

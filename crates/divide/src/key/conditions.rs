@@ -42,8 +42,8 @@ pub fn conditions(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Opti
     })
 }
 
-/// Warns of the conditions that a `key` which was not cut breaks, see [`KeyConditions::problems`]; it slides out
-/// along a unit vector.
+/// Warns of the conditions that a `key` which was not cut breaks, see [`KeyConditions::problems`]; it slides
+/// out along a unit vector.
 pub fn warn_of_conditions(
     ctx: &Ctx,
     surface: &SegmentedSurface,

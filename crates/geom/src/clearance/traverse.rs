@@ -3,8 +3,9 @@
 use super::pair::{box_distance_sq, sweep_box, swept_box};
 use crate::bvh::TriangleBvh;
 
-/// Calls `near(i, j, apart_sq, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq` of each
-/// other. `i` is a triangle of `a`, moved along z by all `travels`, and `j` one of `b`, both in leaf order.
+/// Calls `near(i, j, apart_sq, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq`
+/// of each other. `i` is a triangle of `a`, moved along z by all `travels`, and `j` one of `b`, both in leaf
+/// order.
 /// `apart_sq` is the squared distance of the boxes. `near` may lower the limit. Nearer boxes come first.
 pub(super) fn for_near_pairs(
     a: &TriangleBvh,

@@ -190,7 +190,7 @@ pub struct Choice<'a> {
     pub params: &'a PlanParams,
     /// Surface of the pieces.
     pub surface: &'a SegmentedSurface,
-    /// The same with even triangles.
+    /// Surface of the pieces with even triangles.
     pub even: &'a EvenSurface,
     /// Connector sizes of each pair.
     pub sizes: &'a ConnectorSizes,

@@ -174,8 +174,8 @@ fn is_above(a: &Rated<'_>, b: &Rated<'_>, rank: Rank) -> bool {
     rank == Rank::Use && is_above(a, b, Rank::Pull)
 }
 
-/// Load factor that must be kept of a goal that reached `reached`, for the sake of less important goals. No use
-/// falls below what is asked of it.
+/// Load factor that must be kept of a goal that reached `reached`, for the sake of less important goals. No
+/// use falls below what is asked of it.
 fn floor(reached: f64, rank: Rank) -> f64 {
     let kept = LEAST_OF_PEAK * reached;
     if rank == Rank::Use && reached >= RESERVE {

@@ -100,8 +100,8 @@ fn widest(excess: &[f64]) -> f64 {
     excess.iter().copied().fold(SURE_PLAY, f64::max)
 }
 
-/// Pieces but the key whose play is surely wider than allowed, the loosest first; `excess` is the share of the
-/// allowed play.
+/// Pieces but the key whose play is surely wider than allowed, the loosest first; `excess` is the share of
+/// the allowed play.
 fn loosest_first(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
     let excess = excess
         .iter()

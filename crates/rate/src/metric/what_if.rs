@@ -31,7 +31,7 @@ pub struct WhatIf<'a> {
     pub sizes: &'a ChosenSizes,
     /// Loads of everyday use, with the present wall.
     pub handling: &'a Handling,
-    /// The plan.
+    /// The plan that is rated, with its costs.
     pub plan: &'a RankedPlan,
     /// Load factor that is asked for.
     pub least_factor: f64,

@@ -152,8 +152,8 @@ impl<T> Best<T> {
         self.reasons.push(reason);
     }
 
-    /// Returns the best end, or the reason why there is none: a failure, else an error, else nothing but a lack
-    /// of time. An error is an answer only if nothing was left out for want of time.
+    /// Returns the best end, or the reason why there is none: a failure, else an error, else nothing but a
+    /// lack of time. An error is an answer only if nothing was left out for want of time.
     pub fn into_answer(self, ctx: &Ctx, agenda: &Agenda) -> Result<Result<Kept<T>, NoPlan>, DesignError> {
         if let Some(kept) = self.entry {
             return Ok(Ok(kept));
