@@ -42,8 +42,10 @@ pub mod shape;
 pub mod shares;
 pub mod stopwatch;
 pub mod stress;
+mod summary;
 mod tabs;
 pub mod told;
+mod upright;
 
 pub use bears::lines as bears_lines;
 pub use failure::Failure;
