@@ -27,6 +27,7 @@ mod fonts;
 pub mod input;
 pub mod kits;
 mod loads;
+mod model;
 mod names;
 pub mod options;
 pub mod output;
