@@ -4,7 +4,7 @@
 //! each triangle bit for bit. Points that merely lie close together stay separate; closing such cracks
 //! belongs to repair, not to reading.
 
-use crate::check::inspect_edges;
+use crate::check::edges::inspect_edges;
 use crate::{TriMesh, Vec3};
 
 /// A mesh after merging of equal points.

@@ -4,6 +4,6 @@ mod names;
 mod record;
 mod table;
 
-pub use names::{ENDINGS, Entry, RECORDS, models, record_file, record_name};
+pub use names::{ENDINGS, Entry, PAGE, RECORDS, models, record_file, record_name};
 pub use record::{Record, Status, kit_is};
-pub use table::{PAGE, files as tables};
+pub use table::files as tables;

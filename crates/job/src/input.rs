@@ -8,9 +8,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use shellock::Warning;
 use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selection};
-use shellock_geom::repair::{InsideOut, Repair, RepairMode, Repaired, repair_as};
+use shellock_geom::repair::{InsideOut, RepairMode, Repaired, repair_as};
 use shellock_geom::simplify::simplify;
 use shellock_geom::{Solid, Vec3};
 use size::{DEFAULT_SIZE_MM, check_size, scale};
@@ -18,6 +17,7 @@ pub use size::{is_usual, length};
 
 use crate::Session;
 use crate::failure::Failure;
+pub use crate::model::Model;
 use crate::names::no_such;
 use crate::options::{LabelsFrom, Options};
 use crate::shape::settle_hollow;
@@ -26,32 +26,6 @@ use crate::shape::settle_hollow;
 const MAX_FILE_BYTES: u64 = 2 << 30;
 /// Number of triangles above which a surface is simplified: most take twice the time with twice as many.
 pub const MANY_TRIANGLES: usize = 100_000;
-
-/// A model that is ready to be made.
-pub struct Model {
-    /// Closed surface in assembly space, mm.
-    pub solid: Solid,
-    /// Labels, one for each triangle of `solid`; `None` if there are none.
-    pub labels: Option<Vec<i64>>,
-    /// For each triangle of `solid`, the face of the file it came from.
-    pub file_face: Vec<u32>,
-    /// Number of faces in the file.
-    pub n_file_faces: usize,
-    /// Transform from file to assembly coordinates, 4 × 4, row-major.
-    pub transform: [f64; 16],
-    /// Name of the file, without folders.
-    pub name: String,
-    /// SHA-256 of the file's bytes.
-    pub sha256: String,
-    /// Notes for people on how the file was read.
-    pub notes: Vec<String>,
-    /// Doubts about how the file was read.
-    pub warnings: Vec<Warning>,
-    /// Part of the file that was read.
-    pub selection: Selection,
-    /// Repairs that made one body of the file's surface.
-    pub repairs: Vec<Repair>,
-}
 
 /// Reads a file whole; fails if it is larger than 2 GiB.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {

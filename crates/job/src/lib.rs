@@ -27,6 +27,7 @@ mod fonts;
 pub mod input;
 pub mod kits;
 mod loads;
+mod model;
 mod names;
 pub mod options;
 pub mod output;
@@ -42,8 +43,10 @@ pub mod shape;
 pub mod shares;
 pub mod stopwatch;
 pub mod stress;
+mod summary;
 mod tabs;
 pub mod told;
+mod upright;
 
 pub use bears::lines as bears_lines;
 pub use failure::Failure;

@@ -12,7 +12,7 @@ use shellock::strength::{Strength, StressMap};
 use shellock::verify::thin_share;
 use shellock::{SegmentedSurface, Warning};
 use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
-use shellock_geom::{TriMesh, Vec3};
+use shellock_geom::TriMesh;
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
 
@@ -20,10 +20,12 @@ use crate::failure::Failure;
 use crate::files::Writing;
 use crate::files::with_slashes;
 use crate::input::{Model, sha256};
-use crate::options::{Axis, Options};
+use crate::options::Options;
 use crate::page;
 use crate::paint::paint_patches;
 use crate::printing::Printing;
+pub use crate::summary::{Summary, connector_sizes};
+pub use crate::upright::{turn_back, turn_upright};
 
 /// Name of the plan within a kit.
 pub const PLAN: &str = "plan.json";
@@ -46,18 +48,6 @@ const KIT_FILES: [&str; 13] = [
     "stress.json",
     "stress.svg",
 ];
-
-/// Figures of a kit, for people and machines.
-pub struct Summary {
-    /// Volume of all pieces over the volume of the solid model.
-    pub volume_ratio: f64,
-    /// Mass of the pieces without supports, g.
-    pub grams: f64,
-    /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
-    pub connector_share: f64,
-    /// Largest share of a piece's volume that is thinner than the thinnest printable wall, in [0, 1].
-    pub thin_share: f64,
-}
 
 /// Folder of a kit to be written. All files are first written to a folder beside it, which is moved into
 /// place at the end.
@@ -399,28 +389,6 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     bytes
 }
 
-/// Range of the sizes of connectors that were made, mm, as in "2.5" or "2.0–3.4".
-pub fn connector_sizes(design: &Design) -> String {
-    if design.kit.sizes.pairs().next().is_none() {
-        return design.kit.sizes.default_mm().to_string();
-    }
-    let made = design
-        .kit
-        .joints
-        .iter()
-        .filter(|j| j.length_mm > 0.0)
-        .map(|j| [design.kit.sizes.of(j.male, j.female); 2]);
-    let ends = made
-        .reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])])
-        .unwrap_or([design.kit.sizes.default_mm(); 2]);
-    let [least, most] = ends.map(|d| format!("{d:.1}"));
-    if least == most {
-        most
-    } else {
-        format!("{least}–{most}")
-    }
-}
-
 /// Chart of the stress in the model and along its seams, as SVG.
 fn stress_chart(options: &Options, settings: &Settings, design: &Design, strength: &Strength) -> String {
     let map = StressMap::new(strength);
@@ -438,24 +406,6 @@ fn stress_chart(options: &Options, settings: &Settings, design: &Design, strengt
     strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| {
         turn_upright(options.up, v)
     })
-}
-
-/// Turns a vector so that `up` becomes z.
-pub fn turn_upright(up: Axis, v: Vec3) -> Vec3 {
-    match up {
-        Axis::X => Vec3::new(-v.z, v.y, v.x),
-        Axis::Y => Vec3::new(v.x, -v.z, v.y),
-        Axis::Z => v,
-    }
-}
-
-/// Turns a vector back: `turn_back(up, turn_upright(up, v))` is `v`.
-pub fn turn_back(up: Axis, v: Vec3) -> Vec3 {
-    match up {
-        Axis::X => Vec3::new(v.z, v.y, -v.x),
-        Axis::Y => Vec3::new(v.x, v.z, -v.y),
-        Axis::Z => v,
-    }
 }
 
 #[cfg(test)]

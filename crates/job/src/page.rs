@@ -20,11 +20,12 @@ use crate::fonts;
 use crate::input::Model;
 use crate::loads;
 use crate::options::Options;
-use crate::output::{Summary, connector_sizes, turn_upright};
 use crate::place::Standing;
 use crate::printing::Printing;
+use crate::summary::{Summary, connector_sizes};
 use crate::tabs;
 use crate::told::{bearing, scope};
+use crate::upright::turn_upright;
 
 /// Tolerance of shown pieces, as a share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
 const SEEN: f64 = 3e-4;

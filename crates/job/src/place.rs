@@ -4,7 +4,7 @@ use shellock::verify::words::PlaceWords;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::options::Axis;
-use crate::output::turn_upright;
+use crate::upright::turn_upright;
 
 /// A model in upright position.
 pub struct Standing {

@@ -9,7 +9,7 @@ use shellock_geom::thin::{ThinPlace, thin_places};
 use shellock_geom::{Solid, Vec3};
 
 use crate::failure::Failure;
-use crate::input::Model;
+use crate::model::Model;
 use crate::options::{Options, Thickness};
 
 /// Least share of the body's volume of a cavity that `--fill` fills. It is lower than the share at which a

@@ -25,14 +25,16 @@ mod free;
 mod profile;
 mod rail;
 mod run;
+mod station;
 
 pub use frame::{Curve, curves};
 pub use free::is_unobstructed;
 pub use profile::{ProfileRect, Section};
 pub(crate) use rail::{rail_places, stop_mm};
-pub use run::{RailPart, Run, RunShape, RunStation, SeamRoom, runs};
+pub use run::{SeamRoom, runs};
 use shellock_plan::sizes::SizeChoice;
 use shellock_report::ParamProblem;
+pub use station::{RailPart, Run, RunShape, RunStation};
 
 /// Parameters of connectors. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]

@@ -45,8 +45,9 @@ pub use neighbours::{Neighbourhood, PlanName};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
 pub use sample::random_plans;
-pub use score::{PlanScore, score};
+pub use score::PlanScore;
 pub use search::{MakeCosts, search, search_with};
+pub use space::score;
 pub use survey::{PlanSurvey, survey};
 pub use types::{
     Blocker, FoundPlan, LatticePlan, LatticeStep, PlanConstraints, PlanOutcome, PlanProof, ProofScope,

@@ -2,15 +2,14 @@
 //!
 //! Stands in for the paper's metrics (Sect. 5), which need simulated connectors. Like them, the cost is a
 //! bottleneck over the pieces. As in Eq. 6, the cost of a piece depends only on the directions along its own
-//! boundaries. The metrics of a later stage may rank the same plans anew; [`score`] is the one place to
-//! change. Pieces that the verification would find loose cost more than anything else: see
+//! boundaries. The metrics of a later stage may rank the same plans anew; [`score`](super::space::score) is
+//! the one place to change. Pieces that the verification would find loose cost more than anything else: see
 //! [`interface`](super::interface). The cost of a plan is the pure bottleneck, so that bounds can be proved.
 //! The mean decides between plans with the same bottleneck.
 
 use shellock_report::{IdVec, PatchId};
 
-use super::space::Space;
-use super::{LatticePlan, PlanConstraints, PlanSurvey};
+use super::PlanSurvey;
 
 /// Cost of a seam without any usable length, in units of Eq. 4's weight. Scales with the unusable share.
 const UNUSABLE_COST: f64 = 0.5;
@@ -92,13 +91,6 @@ impl PlanScore {
     }
 }
 
-/// Costs of `plan` by [`SeamCosts`](super::SeamCosts). The cost of a piece has three parts: the mean over its
-/// seams, by length, of Eq. 4's weight and of the unusable share; its path; and its missing hold.
-pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &LatticePlan) -> PlanScore {
-    // The tolerance does not matter: costs do not depend on which paths are free.
-    Space::new(survey, constraints, 0.0).score(plan)
-}
-
 /// Cost of one contact if `later` leaves along `s`. A contact that joins nothing has the greatest possible
 /// cost.
 pub(super) fn contact_cost(
@@ -133,78 +125,4 @@ pub(super) fn occluded_cost(
     q: PatchId,
 ) -> f64 {
     OCCLUDED_COST * 100.0 * survey.occlusion.share(piece, q, s)
-}
-
-#[cfg(test)]
-mod tests {
-    use shellock_assembly::LatticeDirection;
-    use shellock_geom::Vec3;
-    use shellock_test_surfaces::{label, seams, sphere};
-
-    use super::*;
-    use crate::{LatticeStep, PlanParams, survey};
-
-    #[test]
-    fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {
-        let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
-        let ctx = shellock_report::Ctx::quiet();
-        let survey = survey(
-            &ctx,
-            &PlanParams::default(),
-            &surface,
-            &seams(&surface),
-            &crate::sizes::ConnectorSizes::default(),
-        )
-        .unwrap();
-        let up = LatticeDirection::nearest(Vec3::Z);
-        let value = |separation| {
-            let steps = [0, 1]
-                .map(|p| LatticeStep {
-                    piece: PatchId(p),
-                    separation,
-                })
-                .to_vec();
-            score(&survey, &PlanConstraints::default(), &LatticePlan { steps }).worst
-        };
-        for s in LatticeDirection::all().filter(|&s| s != up) {
-            assert!(value(up) < value(s));
-        }
-    }
-
-    /// Hold of a plate in the +z plane. Its only neighbour surrounds it, is installed later, and leaves along
-    /// `s`.
-    fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
-        let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
-        let ctx = shellock_report::Ctx::quiet();
-        let survey = survey(
-            &ctx,
-            &PlanParams::default(),
-            &surface,
-            &seams(&surface),
-            &crate::sizes::ConnectorSizes::default(),
-        )
-        .unwrap();
-        let separation = LatticeDirection::nearest(s);
-        let steps = [0, 1]
-            .map(|p| LatticeStep {
-                piece: PatchId(p),
-                separation,
-            })
-            .to_vec();
-        let mut constraints = PlanConstraints::default();
-        if is_weak {
-            constraints.weaken(PatchId(0), PatchId(1));
-        }
-        let plan = LatticePlan { steps };
-        let space = Space::new(&survey, &constraints, 0.0);
-        let (role, around) = &space.surroundings(&plan)[0];
-        super::super::SeamCosts::new(&survey, &constraints).hold_mm3(PatchId(0), *role, around)
-    }
-
-    #[test]
-    fn a_piece_is_loose_opposite_to_its_only_later_neighbour_and_without_connectors() {
-        // The later piece leaves along −z, so nothing stops the plate along +z. Across, it is held.
-        assert!(hold_of_plate(-Vec3::Z, false) < 1e-3);
-        assert_eq!(hold_of_plate(-Vec3::Z, true), 0.0);
-    }
 }

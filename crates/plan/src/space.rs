@@ -292,3 +292,83 @@ fn by_direction<T>(make: impl Fn(LatticeDirection) -> T) -> [T; LatticeDirection
     let mut all = LatticeDirection::all();
     std::array::from_fn(|_| make(all.next().expect("as many as COUNT")))
 }
+
+/// Costs of `plan` by [`SeamCosts`]. The cost of a piece has three parts: the mean over its
+/// seams, by length, of Eq. 4's weight and of the unusable share; its path; and its missing hold.
+pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &LatticePlan) -> PlanScore {
+    // The tolerance does not matter: costs do not depend on which paths are free.
+    Space::new(survey, constraints, 0.0).score(plan)
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Vec3;
+    use shellock_test_surfaces::{label, seams, sphere};
+
+    use super::*;
+    use crate::{PlanParams, survey};
+
+    #[test]
+    fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {
+        let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
+        let ctx = shellock_report::Ctx::quiet();
+        let survey = survey(
+            &ctx,
+            &PlanParams::default(),
+            &surface,
+            &seams(&surface),
+            &crate::sizes::ConnectorSizes::default(),
+        )
+        .unwrap();
+        let up = LatticeDirection::nearest(Vec3::Z);
+        let value = |separation| {
+            let steps = [0, 1]
+                .map(|p| LatticeStep {
+                    piece: PatchId(p),
+                    separation,
+                })
+                .to_vec();
+            score(&survey, &PlanConstraints::default(), &LatticePlan { steps }).worst
+        };
+        for s in LatticeDirection::all().filter(|&s| s != up) {
+            assert!(value(up) < value(s));
+        }
+    }
+
+    /// Hold of a plate in the +z plane. Its only neighbour surrounds it, is installed later, and leaves along
+    /// `s`.
+    fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
+        let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
+        let ctx = shellock_report::Ctx::quiet();
+        let survey = survey(
+            &ctx,
+            &PlanParams::default(),
+            &surface,
+            &seams(&surface),
+            &crate::sizes::ConnectorSizes::default(),
+        )
+        .unwrap();
+        let separation = LatticeDirection::nearest(s);
+        let steps = [0, 1]
+            .map(|p| LatticeStep {
+                piece: PatchId(p),
+                separation,
+            })
+            .to_vec();
+        let mut constraints = PlanConstraints::default();
+        if is_weak {
+            constraints.weaken(PatchId(0), PatchId(1));
+        }
+        let plan = LatticePlan { steps };
+        let space = Space::new(&survey, &constraints, 0.0);
+        let (role, around) = &space.surroundings(&plan)[0];
+        super::super::SeamCosts::new(&survey, &constraints).hold_mm3(PatchId(0), *role, around)
+    }
+
+    #[test]
+    fn a_piece_is_loose_opposite_to_its_only_later_neighbour_and_without_connectors() {
+        // The later piece leaves along −z, so nothing stops the plate along +z. Across, it is held.
+        assert!(hold_of_plate(-Vec3::Z, false) < 1e-3);
+        assert_eq!(hold_of_plate(-Vec3::Z, true), 0.0);
+    }
+}

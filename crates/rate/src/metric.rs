@@ -13,13 +13,14 @@ mod foreseen;
 mod foresight;
 mod handover;
 mod model;
+mod question;
 mod rating;
 #[cfg(test)]
 mod tests;
 mod what_if;
 
 pub use choice::{
-    BY_SIMULATION, Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
+    BY_SIMULATION, Bears, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
     SeamHolding, WeakestUse, choose, choose_or_change,
 };
 pub use climb::{ClimbError, ClimbParams, ClimbRules, Climbed, climb};
@@ -28,5 +29,6 @@ pub use deform::{Deformed, DeformedLoad, Told, Touch};
 pub use foreseen::{Foreseen, foreseen};
 pub use foresight::Foresight;
 pub use model::{EvenSurface, MetricParams, PlanModel};
+pub use question::Choice;
 pub use rating::{Bench, RESERVE, Rated};
 pub use what_if::{WhatIf, is_worth, weakest_use};

@@ -3,6 +3,7 @@
 //! The page is self-contained and needs no network. Its viewer (`viewer/` of the repository) knows meshes,
 //! arrows and points with labels. This crate translates shells and pieces to those.
 
+mod arrays;
 mod loads;
 mod packed;
 mod page;

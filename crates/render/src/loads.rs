@@ -10,7 +10,7 @@
 use serde::Serialize;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-use crate::page::{PointArray, TriangleArray, align, append_points, append_triangles};
+use crate::arrays::{PointArray, TriangleArray, align, append_points, append_triangles};
 
 /// Displayed size of the largest displacement, as a share of the diagonal of all carriers. Large enough to
 /// show where the model bends, and small enough to keep its shape recognisable.

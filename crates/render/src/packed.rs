@@ -7,7 +7,7 @@
 use serde::Serialize;
 use shellock_geom::{TriMesh, Vec3};
 
-use crate::page::align;
+use crate::arrays::align;
 
 /// Number of steps of a coordinate across the box.
 const STEPS: f64 = 65_535.0;

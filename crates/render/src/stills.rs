@@ -5,6 +5,7 @@
 //! are drawn in parallel, each independently, so the picture does not depend on the number of cores.
 
 mod canvas;
+mod sample;
 mod shade;
 
 use std::borrow::Cow;
@@ -12,8 +13,9 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use canvas::Band;
 pub use canvas::Image;
-use canvas::{Band, Sample};
+use sample::Sample;
 pub use shade::crease_normals;
 
 /// Samples per pixel along each axis.

@@ -88,13 +88,6 @@ impl Default for Params {
     }
 }
 
-impl Params {
-    /// Lists every problem of every stage, in words. Empty if the parameters are valid.
-    pub fn problems(&self) -> Vec<String> {
-        crate::stages::problems(self)
-    }
-}
-
 /// Choice of the wall thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {

@@ -127,20 +127,23 @@ impl Settings {
     }
 }
 
-/// Lists every problem of every stage, in words. Values derived from others are not reported twice.
-pub(crate) fn problems(params: &Params) -> Vec<String> {
-    let settings = Settings::resolve(params);
-    let label = params.label.map_or_else(Vec::new, |l| l.problems());
-    let stages = [
-        settings.body.problems(),
-        settings.connector.problems(),
-        settings.strength.problems(),
-        label,
-    ];
-    let mut problems: Vec<String> = stages.into_iter().flatten().map(|p| p.to_string()).collect();
-    problems.extend(segmentation(params).problems());
-    problems.extend(plan(params).problems());
-    problems
+impl Params {
+    /// Lists every problem of every stage, in words. Empty if the parameters are valid; values derived from
+    /// others are not reported twice.
+    pub fn problems(&self) -> Vec<String> {
+        let settings = Settings::resolve(self);
+        let label = self.label.map_or_else(Vec::new, |l| l.problems());
+        let stages = [
+            settings.body.problems(),
+            settings.connector.problems(),
+            settings.strength.problems(),
+            label,
+        ];
+        let mut problems: Vec<String> = stages.into_iter().flatten().map(|p| p.to_string()).collect();
+        problems.extend(segmentation(self).problems());
+        problems.extend(plan(self).problems());
+        problems
+    }
 }
 
 /// Returns the user's parameters of the division, with defaults for the others.

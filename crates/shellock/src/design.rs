@@ -18,10 +18,13 @@ mod candidate;
 mod causes;
 mod cost;
 mod division;
+mod failure;
+mod job;
 mod kit;
 mod lesson;
 mod outcome;
 mod outlook;
+mod planning;
 mod strengthen;
 #[cfg(test)]
 mod tests;

@@ -6,8 +6,8 @@ use shellock::{Cancelled, Ctx};
 
 use crate::chart::{Corner, Curve, Labels, bands};
 use crate::failure::Failure;
+use crate::sheet::Sheet;
 use crate::statistics::band;
-use crate::study::Sheet;
 use crate::table::{Table, markdown};
 
 /// Runs of one search with several seeds: for each, its improvements (evaluations, cost).

@@ -15,7 +15,7 @@ use shellock_formats::write_stl_binary;
 
 use crate::failure::Failure;
 use crate::hard;
-use crate::study::write_all;
+use crate::sheet::write_all;
 
 /// Which models, and how they are made.
 #[derive(Args)]

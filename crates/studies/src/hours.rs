@@ -20,7 +20,7 @@ use shellock_print::plates::{Laid, Printable, lay, lay_alone};
 use shellock_print::time::{Cost, PLASTIC_FEATURES, TIME_FEATURES, plastic_features, time_features};
 
 use crate::failure::Failure;
-use crate::study::write_all;
+use crate::sheet::write_all;
 use crate::table::markdown;
 
 /// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.

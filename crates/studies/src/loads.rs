@@ -15,8 +15,8 @@ use shellock_volume::compare::{borne_by_solids, volume_model};
 use crate::failure::Failure;
 use crate::metrics::{Subject, SubjectOptions, subject};
 use crate::model::at_least_one;
+use crate::sheet::write_all;
 use crate::statistics::spearman;
-use crate::study::write_all;
 use crate::table::{Table, markdown};
 
 /// Which plans of which model.

@@ -3,6 +3,7 @@
 //!
 //! `cargo xtask` builds and runs this program; `cargo xtask --help` lists the tasks.
 
+mod agreement;
 mod chart;
 mod convergence;
 mod effort;
@@ -18,6 +19,7 @@ mod pictures;
 mod savings;
 mod search;
 mod segmentations;
+mod sheet;
 mod statistics;
 mod strength;
 mod study;

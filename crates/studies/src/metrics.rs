@@ -13,9 +13,10 @@ use shellock::metric::{MetricParams, PlanModel};
 use shellock::plan::{LatticePlan, PlanSurvey, random_plans};
 use shellock_mechanics::Meeting;
 
+use crate::agreement::agreement;
 use crate::failure::Failure;
 use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};
-use crate::study::{Sheet, agreement, write_all};
+use crate::sheet::{Sheet, write_all};
 use crate::table::Table;
 use column::Column;
 pub use column::failed;

@@ -12,7 +12,7 @@ use crate::chart::{Interval, Labels, intervals};
 use crate::convergence::{Runs, convergence_sheets, runs};
 use crate::failure::Failure;
 use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
-use crate::study::{Sheet, write_all};
+use crate::sheet::{Sheet, write_all};
 use crate::table::{Table, markdown};
 
 /// Which searches of which model.

@@ -16,7 +16,7 @@ use shellock::segmentation::figures::{DivisionFigures, FigureParams, figures};
 use crate::convergence::{Runs, convergence_sheets, runs};
 use crate::failure::Failure;
 use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
-use crate::study::{Sheet, write_all};
+use crate::sheet::{Sheet, write_all};
 use crate::table::{Table, markdown};
 
 /// Model, divisions of it, and runs of the search.

@@ -10,7 +10,7 @@ use shellock_geom::Solid;
 
 use crate::failure::Failure;
 use crate::model::{ModelOptions, load, with_ctx};
-use crate::study::write_all;
+use crate::sheet::write_all;
 use crate::table::markdown;
 
 /// Factors on the number of points of the analysis mesh.

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
-use crate::chart::{Corner, Curve, Labels, bands, scatter, sorted_scores};
+use crate::agreement::agreement;
+use crate::chart::{Corner, Curve, Labels, bands};
 use crate::effort::{self, EffortOptions};
 use crate::failure::Failure;
 use crate::hours::{self, HoursOptions};
@@ -14,9 +15,10 @@ use crate::loads::{self, LoadsOptions};
 use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
 use crate::segmentations::{self, SegmentationsOptions};
-use crate::statistics::{band, kendall, spearman};
+use crate::sheet::{Sheet, write_all};
+use crate::statistics::band;
 use crate::strength::{self, StrengthOptions};
-use crate::table::{Table, markdown};
+use crate::table::Table;
 use crate::worse::{self, WorseOptions};
 
 /// Study to run, and folder of its charts.
@@ -89,74 +91,6 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// Splits the header of a column, "name" or "name [unit]", into name and unit.
-fn parts(column: &str) -> (&str, Option<&str>) {
-    let split = column.strip_suffix(']').and_then(|c| c.split_once(" ["));
-    split.map_or((column, None), |(name, unit)| (name, Some(unit)))
-}
-
-fn axis(column: &str) -> String {
-    let (name, unit) = parts(column);
-    unit.map_or_else(
-        || format!("score by {name}"),
-        |unit| format!("score by {name}, {unit}"),
-    )
-}
-
-/// A file to be written: its name in the study's folder, and its text.
-pub type Sheet = (String, String);
-
-/// Curves of all metrics over the plans, a scatter plot of each against the first, and a table of the rank
-/// correlations.
-pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
-    let columns: Vec<(&str, &[f64])> = scores
-        .columns
-        .iter()
-        .map(|(n, v)| (n.as_str(), v.as_slice()))
-        .collect();
-    let Some(((first, reference), others)) = columns.split_first() else {
-        return Ok(Vec::new());
-    };
-    let x = format!("plan number, sorted by {}", parts(first).0);
-    let labels = Labels {
-        title: "Scores of the same plans",
-        x: &x,
-        y: "score, scaled to 0 … 1",
-    };
-    let mut sheets = vec![("scores.svg".to_owned(), sorted_scores(&labels, &columns)?)];
-    let mut rows = Vec::new();
-    for (name, values) in others {
-        let (title, x, y) = (
-            format!("{} and {}", parts(name).0, parts(first).0),
-            axis(first),
-            axis(name),
-        );
-        let labels = Labels {
-            title: &title,
-            x: &x,
-            y: &y,
-        };
-        sheets.push((
-            format!("{}.svg", file_name(parts(name).0)),
-            scatter(&labels, reference, values)?,
-        ));
-        let say = |r: Option<f64>| r.map_or("undefined".to_owned(), |r| format!("{r:.3}"));
-        rows.push(vec![
-            (*name).to_owned(),
-            say(spearman(reference, values)),
-            say(kendall(reference, values)),
-        ]);
-    }
-    let head = [
-        "metric",
-        &format!("Spearman ρ with {first}"),
-        &format!("Kendall τ-b with {first}"),
-    ];
-    sheets.push(("correlations.md".to_owned(), markdown(&head, &rows)));
-    sheets.push(("scores.csv".to_owned(), scores.to_csv()));
-    Ok(sheets)
-}
-
 /// Runs of each variant, in order; each run is a list of its improvements (seconds, score).
 pub type Runs = BTreeMap<usize, Vec<Vec<(f64, f64)>>>;
 
@@ -225,59 +159,14 @@ fn read(path: &Path) -> Result<Table, Failure> {
     })
 }
 
-/// Writes the sheets into the folder `study` of `out`; returns the files.
-pub fn write_all(out: &Path, study: &str, sheets: &[Sheet]) -> Result<Vec<PathBuf>, Failure> {
-    let folder = out.join(study);
-    fs::create_dir_all(&folder).map_err(|source| Failure::File {
-        path: folder.clone(),
-        source,
-    })?;
-    let write = |(name, text): &Sheet| {
-        let path = folder.join(name);
-        fs::write(&path, text).map_err(|source| Failure::File {
-            path: path.clone(),
-            source,
-        })?;
-        Ok(path)
-    };
-    sheets.iter().map(write).collect()
-}
-
 fn stem(path: &Path) -> String {
     path.file_stem()
         .map_or_else(|| "study".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// Replaces every character of `name` that is not alphanumeric by `-`.
-fn file_name(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_alphanumeric() { c } else { '-' })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn agreement_compares_every_metric_with_the_first() {
-        let table = Table::from_csv("volume [mm],surface,data-driven\n1,2,3\n2,4,2\n3,8,1\n").unwrap();
-        let sheets = agreement(&table).unwrap();
-        let names: Vec<&str> = sheets.iter().map(|s| s.0.as_str()).collect();
-        assert_eq!(
-            names,
-            [
-                "scores.svg",
-                "surface.svg",
-                "data-driven.svg",
-                "correlations.md",
-                "scores.csv"
-            ]
-        );
-        assert!(sheets[1].1.contains("score by volume, mm"));
-        assert!(sheets[3].1.contains("| surface | 1.000 | 1.000 |"));
-        assert!(sheets[3].1.contains("| data-driven | -1.000 | -1.000 |"));
-    }
 
     #[test]
     fn runs_are_sorted_by_variant_seed_and_time() {

@@ -14,7 +14,7 @@ use shellock_volume::compare::compare;
 
 use crate::failure::Failure;
 use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};
-use crate::study::write_all;
+use crate::sheet::write_all;
 use crate::table::markdown;
 
 /// Which kit, and how many plans of half its score.

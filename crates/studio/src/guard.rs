@@ -4,9 +4,6 @@
 //! resolve to it. So the host and the origin must be this server's own, and requests beyond the page itself
 //! need the token. The rate of requests is limited.
 
-use std::sync::Mutex;
-use std::time::Instant;
-
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
@@ -14,13 +11,10 @@ use axum::response::{IntoResponse, Response};
 
 use crate::Address;
 use crate::refusal::Refusal;
-use crate::routes::Studio;
+use crate::state::Studio;
 
 /// Length of a token in bytes: nobody guesses 256 bits.
 const TOKEN_BYTES: usize = 32;
-/// Largest burst of requests, and the rate at which the budget refills, requests per second.
-const MOST_AT_ONCE: f64 = 200.0;
-const MOST_PER_SECOND: f64 = 100.0;
 /// Policy of the studio's page, which loads nothing from other servers.
 const PAGE_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' \
                            'unsafe-inline'; frame-src 'self'; object-src 'none'; base-uri 'none'; \
@@ -41,26 +35,6 @@ pub fn token() -> std::io::Result<String> {
 pub fn is_token(address: &Address, given: &str) -> bool {
     let (a, b) = (address.token.as_bytes(), given.as_bytes());
     a.len() == b.len() && a.iter().zip(b).fold(0, |differs, (x, y)| differs | (x ^ y)) == 0
-}
-
-/// Token bucket that limits the rate of requests.
-pub struct Rate(Mutex<(f64, Instant)>);
-
-impl Rate {
-    pub fn new() -> Self {
-        Self(Mutex::new((MOST_AT_ONCE, Instant::now())))
-    }
-
-    /// Counts one more request. Returns false if it exceeds the limit.
-    fn admits(&self) -> bool {
-        let mut state = self.0.lock().expect("no holder of this lock panics");
-        let now = Instant::now();
-        let (left, since) = *state;
-        let left = (left + MOST_PER_SECOND * (now - since).as_secs_f64()).min(MOST_AT_ONCE);
-        let is_admitted = left >= 1.0;
-        *state = (if is_admitted { left - 1.0 } else { left }, now);
-        is_admitted
-    }
 }
 
 /// Rejects requests that are not allowed, and adds the security headers to every answer.
@@ -146,12 +120,5 @@ mod tests {
         for wrong in [&b[..], "", &a[1..], &format!("{a}0")] {
             assert!(!is_token(&address, wrong));
         }
-    }
-
-    #[test]
-    fn a_burst_is_admitted_and_no_more() {
-        let rate = Rate::new();
-        let admitted = (0..1000).filter(|_| rate.admits()).count();
-        assert!((200..300).contains(&admitted), "{admitted}");
     }
 }

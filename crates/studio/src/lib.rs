@@ -21,8 +21,10 @@ mod kit;
 mod messages;
 mod page;
 mod pieces;
+mod rate;
 mod refusal;
 mod routes;
+mod state;
 mod store;
 
 use std::net::{Ipv4Addr, SocketAddr};

@@ -19,23 +19,16 @@ use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::{Stream, StreamExt};
 
 use crate::bench::Bench;
-use crate::guard::{Rate, guard, is_token};
+use crate::guard::{guard, is_token};
 use crate::jobs::{Event, Job, Jobs};
 use crate::messages::{Divided, Judgement, Shown};
+use crate::rate::Rate;
 use crate::refusal::Refusal;
+use crate::state::Studio;
 use crate::{Address, MOST_BYTES, kit, page};
 
 /// Largest body of requests other than models, bytes: labels of four million triangles.
 const MOST_OTHER_BYTES: usize = 16 << 20;
-
-/// State shared by all handlers.
-#[derive(Clone)]
-pub struct Studio {
-    pub address: Arc<Address>,
-    pub rate: Arc<Rate>,
-    bench: Arc<Bench>,
-    jobs: Arc<Jobs>,
-}
 
 type Answer<T> = Result<Json<T>, Refusal>;
 

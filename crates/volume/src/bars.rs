@@ -4,10 +4,7 @@ use shellock_geom::Vec3;
 use shellock_mechanics::{Meeting, SIDES};
 
 use super::VolumeModel;
-use super::connector::{Bar, Section, tets_between};
-
-/// Cross-sections of both sides at each station; `None` where it is not joined.
-pub(super) type Sections = Vec<[Option<Section>; 2]>;
+use super::connector::{Bar, Section, Sections, Spans, tets_between};
 
 /// Computes the cross-sections of all stations for a plan.
 pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
@@ -152,10 +149,6 @@ impl Bars<'_> {
         }
     }
 }
-
-/// First and last of a part's bars at each section, by station and side. The first carries the contact rows
-/// and load of the station.
-pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
 
 pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {
     let mut spans = vec![[None; 2]; n_stations];

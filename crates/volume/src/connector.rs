@@ -19,11 +19,9 @@ use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 use shellock_mechanics::{Joint, Side};
 
 use super::VolumeModel;
-use super::bars::{Sections, Spans};
 use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
-use super::rows::ROWS;
-use super::unknowns::{Labels, Owner};
+use super::unknowns::{Labels, N_ACROSS, N_ALONG_S, N_SECTION, Owner, ROWS};
 
 /// Distance outside the wall at which corners still count as inside, as a share of D: points on the inner
 /// surface are inside.
@@ -32,10 +30,6 @@ const SLACK: f64 = 0.05;
 /// for a connector.
 const MIN_VOLUME_SHARE: f64 = 0.1;
 
-/// Number of places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
-const N_ALONG_S: usize = 5;
-const N_ACROSS: usize = 3;
-pub(super) const N_SECTION: usize = N_ALONG_S * N_ACROSS;
 /// Nodes of the bar between two stations: cross-sections at both ends and halfway.
 const N_BAR: usize = 3 * N_SECTION;
 
@@ -133,6 +127,13 @@ pub(super) struct Bar {
     /// Corners of the bar's tetrahedra, as nodes of its lattice.
     pub tets: Vec<[usize; 4]>,
 }
+
+/// Cross-sections of both sides at each station; `None` where it is not joined.
+pub(super) type Sections = Vec<[Option<Section>; 2]>;
+
+/// First and last of a part's bars at each section, by station and side. The first carries the contact rows
+/// and load of the station.
+pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
 
 /// Lattice node at `is` along s, `k` across and `it` along the seam.
 fn lattice(is: usize, k: usize, it: usize) -> usize {

@@ -28,19 +28,18 @@ mod tests;
 mod unknowns;
 mod wall;
 
-use bars::{Sections, Spans};
-use connector::{Bar, Section};
+use connector::{Bar, Section, Sections, Spans};
 use contact::{Equilibrium, Response};
 pub use element::Order;
 use front::Front;
 pub use load::Loaded;
 use part::Part;
 use rayon::prelude::*;
-use rows::{ROWS, WALL};
+use rows::WALL;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
-use unknowns::Labels;
+use unknowns::{Labels, ROWS};
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
 /// Parameters of the model of walls and connectors.

@@ -17,15 +17,15 @@ use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
 use shellock_mechanics::assembly::is_lost;
 use shellock_mechanics::{Meeting, StressLevel, StressSample};
 
-use super::bars::{self, Sections};
-use super::connector::{self, Bar};
+use super::bars;
+use super::connector::{self, Bar, Sections};
 use super::contact::{self, Equilibrium, Response};
 use super::element::volume_6;
 use super::front::Front;
 use super::part::{Numbering, RigidModes, assemble};
-use super::rows::{self, ROWS, WALL};
+use super::rows::{self, WALL};
 use super::stress::samples;
-use super::unknowns::Labels;
+use super::unknowns::{Labels, ROWS};
 use super::{VolumeError, VolumeModel, mechanism};
 
 /// Conversion from g/cm³ to t/mm³, so that t · mm/s² = N.

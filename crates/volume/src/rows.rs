@@ -14,9 +14,6 @@ use super::VolumeModel;
 use super::front::Front;
 use super::unknowns::Labels;
 
-/// Number of contact rows of a station.
-pub(super) const ROWS: usize = 7;
-
 /// Index of the row for the walls' faces; those before belong to the connector.
 pub(super) const WALL: usize = 6;
 

@@ -2,8 +2,13 @@
 
 use shellock_mechanics::{SIDES, Side};
 
-use super::connector::N_SECTION;
-use super::rows::ROWS;
+/// Number of contact rows of a station.
+pub(super) const ROWS: usize = 7;
+
+/// Number of places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
+pub(super) const N_ALONG_S: usize = 5;
+pub(super) const N_ACROSS: usize = 3;
+pub(super) const N_SECTION: usize = N_ALONG_S * N_ACROSS;
 
 /// Labels of a part's unknowns, in this order: wall, contact rows, load, nodes of the sections, nodes
 /// halfway.

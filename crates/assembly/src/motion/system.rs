@@ -4,13 +4,9 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use shellock_geom::Vec3;
 
 use super::Contact;
-use super::forces::Balance;
 use super::{Freedom, Twist};
 use crate::PatchId;
 
-/// Mean opening speed of the contacts that counts as zero. The outside judge bounds the optimum of its
-/// program by 1e-6; ours is an upper bound of that optimum.
-const OPENING: f64 = 5e-7;
 /// Least ratio of smallest to greatest eigenvalue of `AᵀA`, below which pieces can slide without opening a
 /// contact; the outside judge has 1e-7.
 const SLIDING: f64 = 1.5e-7;
@@ -95,21 +91,6 @@ impl System {
             * (meets(a.plus, b.plus) + meets(a.minus, b.minus)
                 - meets(a.plus, b.minus)
                 - meets(a.minus, b.plus))
-    }
-
-    /// Mean of all rows, `Aᵀ1 / m`.
-    fn mean(&self) -> DVector<f64> {
-        let mut mean = DVector::zeros(self.n);
-        self.rows
-            .iter()
-            .for_each(|row| self.add(row, 1.0 / self.rows.len() as f64, &mut mean));
-        mean
-    }
-
-    /// Finds a motion that opens contacts and closes none; `None` if there is none.
-    pub(super) fn opening_motion(&self) -> Option<DVector<f64>> {
-        let Balance { rest, .. } = self.balance(&self.mean(), OPENING);
-        (rest.lp_norm(1) > OPENING).then(|| -rest)
     }
 
     /// Gram matrix `Σ w a aᵀ` over the given rows `a` and weights `w`.

@@ -4,8 +4,9 @@ use shellock_report::Ctx;
 use shellock_segment::mirrored::Mirrored;
 use shellock_surface::SegmentedSurface;
 
+use super::ground::Ground;
 use super::method::symmetry_plane;
-use super::refine::{Ground, n_faults, refine_on};
+use super::refine::{n_faults, refine_on};
 use super::settle::settle_seams;
 use super::smooth::smooth_and_cut;
 use super::{FaceLabels, LabelOrigin, SegmentationError, SegmentationParams};

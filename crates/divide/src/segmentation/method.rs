@@ -16,9 +16,9 @@ use shellock_segment::whole::Whole;
 use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
 
 use super::creases::crease_labels;
+use super::ground::Ground;
 use super::halve::halve_long_edges;
 use super::keep_whole::gather_regions;
-use super::refine::Ground;
 use super::user::user_labels;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 

@@ -6,7 +6,8 @@
 
 use shellock_segment::border;
 
-use super::refine::{Ground, n_faults};
+use super::ground::Ground;
+use super::refine::n_faults;
 use super::{FaceLabels, SegmentationParams};
 
 /// Greatest distances that seams may move, mm, in consecutive rounds.

@@ -17,7 +17,7 @@ use shellock_surface::seam::{seam_half_edges, stretches};
 
 use super::FaceLabels;
 use super::dual_graph::DualGraph;
-use super::refine::Ground;
+use super::ground::Ground;
 
 /// Cost of one fault of topology relative to shape: more than the worst shape.
 const FAULT: f64 = 4.0;

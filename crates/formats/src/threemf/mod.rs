@@ -8,6 +8,7 @@ mod model;
 mod namespace;
 mod package;
 mod part;
+mod parts;
 mod role;
 mod settings;
 mod write;

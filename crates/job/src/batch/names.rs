@@ -22,8 +22,12 @@ pub struct Entry {
 pub const ENDINGS: [&str; 9] = ["stl", "obj", "ply", "off", "3mf", "glb", "gltf", "gz", "zip"];
 /// Folder of the records, within the folder for kits.
 pub const RECORDS: &str = ".batch";
+/// Name of the table for machines.
+pub const TABLE: &str = "batch.csv";
+/// Name of the table for people, with pictures.
+pub const PAGE: &str = "batch.html";
 /// Kit names reserved for the tables and the records.
-const TAKEN: [&str; 3] = [super::table::PAGE, super::table::TABLE, RECORDS];
+const TAKEN: [&str; 3] = [PAGE, TABLE, RECORDS];
 /// Number of letters of a kit's name that its record's name repeats.
 const TOLD_LETTERS: usize = 60;
 

@@ -4,12 +4,8 @@ use std::fmt::Write as _;
 
 use shellock_render::escape;
 
+use super::names::{PAGE, TABLE};
 use super::record::{Record, Status};
-
-/// Name of the table for machines.
-pub const TABLE: &str = "batch.csv";
-/// Name of the table for people, with pictures.
-pub const PAGE: &str = "batch.html";
 
 const STYLE: &str = "body{font:15px/1.45 \
      system-ui,sans-serif;margin:24px;color:#26242b;background:#f8f7f5}table{border-collapse:collapse;\

@@ -3,8 +3,8 @@
 use shellock_geom::Vec3;
 use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, PIN_DEPTH, PIN_WIDTH};
 
-use super::run::RailPart;
-use super::{ConnectorParams, RunShape, RunStation};
+use super::ConnectorParams;
+use super::station::{RailPart, RunShape, RunStation};
 
 /// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

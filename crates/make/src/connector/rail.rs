@@ -9,7 +9,8 @@ use shellock_surface::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, SHORTEST_RA
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::run::{RailPart, Run, RunShape, RunStation, has_room};
+use super::free::has_room;
+use super::station::{RailPart, Run, RunShape, RunStation};
 
 /// Greatest deviation of the seam from a straight line, across, and of the wall's inner side, up and down, in
 /// connector sizes.

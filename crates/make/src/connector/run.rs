@@ -9,98 +9,16 @@ use shellock_surface::seam::rules::{
     MAX_ALONG_SEAM, MAX_BACKWARD_RAD, SHARPEST_TURN, SHORTEST_RUN_SIZES, end_gap_mm,
 };
 
+use super::ConnectorParams;
 use super::frame::Curve;
+use super::free::has_room;
 use super::rail::rails;
-use super::{ConnectorParams, Section};
+use super::station::{Run, RunShape, RunStation};
 
 /// Limits of a run's cell: deviation from the curve, mm, turn, rad, and length, mm.
 const CELL_SAG_MM: f64 = 0.03;
 const CELL_TURN: f64 = 0.12;
 const CELL_LENGTH_MM: f64 = 6.0;
-/// Least share of a section's sample points that must be free for a connector to be worth making there.
-const LEAST_FREE: f64 = 0.6;
-
-/// A place on a run, with the frame of its cross-section.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunStation {
-    /// Point on the edge between the wall and the inner surface.
-    pub point: Vec3,
-    /// Unit tangent `u` of the seam.
-    pub tangent: Vec3,
-    /// Unit vector from male to female, perpendicular to `u` and ŝ.
-    pub n: Vec3,
-    /// ŝ: unit direction in which the male leaves the female.
-    pub s: Vec3,
-    /// Angle T from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2,
-    /// π/2].
-    pub theta: f64,
-    /// Length of ŝ projected across the seam, in (0, 1].
-    pub depth: f64,
-    /// Distance along the curve, mm.
-    pub arc_mm: f64,
-    /// Connector size D, mm.
-    pub size_mm: f64,
-    /// Gap between the two halves, mm.
-    pub clearance_mm: f64,
-    /// Kind of the cross-section.
-    pub shape: RunShape,
-}
-
-/// The kinds of cross-sections.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunShape {
-    /// Pin and channel of a seam that the piece leaves across.
-    Seam,
-    /// Tongue and groove of a seam that a key slides along; `n` points to the key, ŝ out of the surface.
-    Rail(RailPart),
-}
-
-/// Position of a section on a rail.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RailPart {
-    /// The tongue in full width.
-    Full,
-    /// The tip of the tongue, narrower so that the groove finds it.
-    LeadIn,
-    /// The end of the groove beyond the tongue, which stops the key.
-    Stop,
-}
-
-/// One stretch of connector: a pin of `male` in a channel of `female`.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// The piece with the pin.
-    pub male: PatchId,
-    /// The piece with the channel.
-    pub female: PatchId,
-    /// Sections to sweep through, in order; two or more.
-    pub stations: Vec<RunStation>,
-}
-
-impl Run {
-    /// Length along the seam, mm.
-    pub fn length(&self) -> f64 {
-        self.stations
-            .windows(2)
-            .map(|w| w[0].point.distance(w[1].point))
-            .sum()
-    }
-
-    /// Returns true if the run is a rail of the key.
-    pub fn is_rail(&self) -> bool {
-        self.stations[0].shape != RunShape::Seam
-    }
-
-    /// Gap between the two halves, mm.
-    pub fn clearance_mm(&self) -> f64 {
-        self.stations[0].clearance_mm
-    }
-
-    /// Point of the middle station.
-    pub fn middle(&self) -> Vec3 {
-        self.stations[self.stations.len() / 2].point
-    }
-}
 
 /// Room for connectors on a seam between two pieces.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,33 +161,6 @@ fn connector_mask(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is
             clear_of_ends && same_role && gentle && sound && s.s.dot(s.tangent).abs() <= MAX_ALONG_SEAM
         })
         .collect()
-}
-
-/// Returns true if both halves have room for most of their section.
-pub(super) fn has_room(
-    params: &ConnectorParams,
-    station: &RunStation,
-    male: PatchId,
-    female: PatchId,
-    is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
-) -> bool {
-    let section = Section::at(params, station);
-    let halves: [(PatchId, &[Option<super::ProfileRect>]); 2] =
-        [(male, &section.male), (female, &section.female)];
-    halves.iter().all(|(piece, parts)| {
-        let (mut free, mut all) = (0.0, 0.0);
-        for part in parts.iter().flatten() {
-            for (a, b) in (0..9).map(|i| (f64::from(i % 3), f64::from(i / 3))) {
-                let n = part.n0 + (part.n1 - part.n0) * (0.5 + a) / 3.0;
-                let s = part.s0 + (part.s1 - part.s0) * (0.5 + b) / 3.0;
-                if let Some(ok) = is_free(*piece, station.point + n * station.n + s * station.s) {
-                    all += 1.0;
-                    free += f64::from(u8::from(ok));
-                }
-            }
-        }
-        all > 0.0 && free >= LEAST_FREE * all
-    })
 }
 
 /// Maximal stretches of allowed points with one role, as inclusive index ranges.

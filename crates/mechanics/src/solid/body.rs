@@ -4,8 +4,8 @@ use shellock_geom::sparse::{Cholesky, EliminationOrder, SparseSymmetric};
 use shellock_geom::{Solid, Vec3};
 
 use super::cells::{Cells, Copy};
-use super::element::{Elements, N_NODES, N_VOXELS, NODES, SIDE, centre, pairs, shapes};
-use super::voxels::voxels;
+use super::element::{Elements, N_NODES, NODES, centre, pairs, shapes};
+use super::voxels::{N_VOXELS, SIDE, voxels};
 use super::{SolidError, SolidParams};
 
 /// Stiffness of the empty share of a cell, relative to the material's. It keeps nodes with almost no material

@@ -13,8 +13,8 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::element::{N_NODES, N_VOXELS, NODES, SIDE};
-use super::voxels::{Cell, Fill, Voxels};
+use super::element::{N_NODES, NODES};
+use super::voxels::{Cell, Fill, N_VOXELS, SIDE, Voxels};
 
 /// Least share of material for a voxel to count. Smaller shares are slivers where a face runs beside a
 /// voxel's own face; they would join separate parts.

@@ -6,14 +6,9 @@
 
 use shellock_geom::Vec3;
 
-use super::voxels::Fill;
+use super::voxels::{Fill, N_VOXELS, SIDE};
 use crate::Material;
 
-/// Number of voxels along a cell's edge. Five give voxels of 0.5 mm in cells of 2.5 mm: a wall of 2 mm is
-/// four of them.
-pub(super) const SIDE: usize = 5;
-/// Number of voxels in a cell.
-pub(super) const N_VOXELS: usize = SIDE * SIDE * SIDE;
 /// Number of nodes of a cell.
 pub(super) const N_NODES: usize = 20;
 /// Number of unordered pairs of nodes, each node with itself included.

@@ -3,7 +3,8 @@
 use shellock_geom::Vec3;
 
 use super::body::Body;
-use super::element::{Elements, N_NODES, N_VOXELS, SIDE, von_mises_mpa};
+use super::element::{Elements, N_NODES, von_mises_mpa};
+use super::voxels::{N_VOXELS, SIDE};
 use crate::stress::StressSample;
 
 /// Least share of material for a voxel to be sampled.

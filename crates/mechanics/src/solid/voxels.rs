@@ -4,7 +4,11 @@ use std::collections::HashMap;
 
 use shellock_geom::{TriMesh, Vec3};
 
-use super::element::{N_VOXELS, SIDE};
+/// Number of voxels along a cell's edge. Five give voxels of 0.5 mm in cells of 2.5 mm: a wall of 2 mm is
+/// four of them.
+pub(super) const SIDE: usize = 5;
+/// Number of voxels in a cell.
+pub(super) const N_VOXELS: usize = SIDE * SIDE * SIDE;
 
 /// Number of lines along z through each voxel, along x and along y. Four by four locate a face parallel to
 /// the lines to an eighth of a voxel, 0.06 mm.

@@ -7,18 +7,15 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
-use shellock_plan::sizes::ConnectorSizes;
-use shellock_plan::{
-    FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
-};
+use shellock_plan::{FoundPlan, LatticePlan, Neighbourhood, RankedPlan};
 use shellock_report::{Cancelled, Ctx, PatchId, Warning};
-use shellock_surface::SegmentedSurface;
 
-use super::climb::{Ascent, ClimbError, ClimbParams, ClimbRules, Climbed};
+use super::climb::{Ascent, ClimbError, ClimbRules, Climbed};
 use super::foresight::{COST_SLACK, Foresight};
+use super::question::Choice;
 use super::rating::{Bench, Rated};
-use super::{Deformed, EvenSurface, Foreseen, PlanModel, foreseen};
-use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
+use super::{Deformed, Foreseen, PlanModel, foreseen};
+use crate::handling::{Borne, DROP_MM, Deed, Failure, LoadCase};
 
 /// Relative difference below which costs count as equal, against rounding.
 const COST_TIE: f64 = 1e-9;
@@ -182,28 +179,6 @@ pub struct SeamHolding {
     pub at: [f64; 3],
     /// Reason of the weakness, for people; it says "the later one" and "the earlier".
     pub reason: String,
-}
-
-/// Input of the choice of a plan.
-pub struct Choice<'a> {
-    /// Parameters by which plans are judged.
-    pub params: &'a PlanParams,
-    /// Surface of the pieces.
-    pub surface: &'a SegmentedSurface,
-    /// Surface of the pieces with even triangles.
-    pub even: &'a EvenSurface,
-    /// Connector sizes of each pair.
-    pub sizes: &'a ConnectorSizes,
-    /// Survey of the pieces.
-    pub survey: &'a PlanSurvey,
-    /// Constraints learned from earlier kits.
-    pub constraints: &'a PlanConstraints,
-    /// Loads that the kit is to withstand.
-    pub handling: &'a Handling,
-    /// Limits of the climb's effort.
-    pub climb: ClimbParams,
-    /// The strongest plan of the same pieces with other connectors, if there is one: a start of the climb.
-    pub former: Option<&'a LatticePlan>,
 }
 
 /// The strongest plan, and its properties.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use shellock_plan::{FoundPlan, LatticePlan, RankedPlan};
 use shellock_report::PatchId;
 
-use super::choice::Choice;
+use super::question::Choice;
 use super::{MetricParams, PlanModel, foreseen};
 
 /// Greatest excess of a plan's cost over the least, as a share, with which it may be chosen.

@@ -1,5 +1,6 @@
-//! Samples of the renderer, and the pictures made of them.
+//! Bands of samples, and the pictures made of them.
 
+use super::sample::{NOTHING, Sample};
 use super::{SAMPLES, shade};
 
 /// Distance at which a line looks for a jump, in samples; lines are twice as wide.
@@ -69,26 +70,6 @@ impl Image {
         bytes
     }
 }
-
-/// Surface point visible at a sample.
-#[derive(Clone, Copy)]
-pub(super) struct Sample {
-    /// Position towards the viewer, in units of a sample.
-    pub depth: f32,
-    /// Normal in view space, about unit length.
-    pub normal: [f32; 3],
-    /// Index of the mesh plus 1; 0 for nothing.
-    pub mesh: u16,
-    /// Unlit colour, in linear light.
-    pub color: [f32; 3],
-}
-
-const NOTHING: Sample = Sample {
-    depth: f32::NEG_INFINITY,
-    normal: [0.0; 3],
-    mesh: 0,
-    color: [0.0; 3],
-};
 
 /// Some rows of samples, with [`LINE_REACH`] more on both sides, so that lines at the border do not depend on
 /// the division into bands.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
 
-use super::canvas::Sample;
+use super::sample::Sample;
 
 /// Cosine of the angle up to which neighbouring triangles share a smooth normal: 40°.
 const SMOOTH_COS: f64 = 0.766;

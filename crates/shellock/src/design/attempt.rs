@@ -1,21 +1,18 @@
 //! One attempt: the plan of a trial, and the kit that is made of it.
 
-use shellock_geom::Vec3;
-
 use super::agenda::{Allowance, Step};
 use super::division::{Division, revise};
+use super::failure::Failure;
 use super::kit::{Recipe, make};
 use super::lesson::lessons;
+use super::planning::Planning;
 use super::strengthen::strengthen;
 use super::trial::{Change, Learned, Parts, Setup};
-use super::ways::Input;
 use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
-use crate::handling::Handling;
-use crate::key::Turn;
-use crate::metric::{Choice, Chosen, ClimbParams, EvenSurface, Foresight, LoadBorne, MetricParams};
+use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams};
 use crate::plan::lesson::Lesson;
-use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey, RankedPlan};
+use crate::plan::{LatticePlan, PlanOutcome, RankedPlan};
 use crate::segmentation::join;
 use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
 
@@ -48,44 +45,6 @@ impl<T> Found<T> {
     fn with(mut self, change: Option<Change>) -> Self {
         self.changes.extend(change);
         self
-    }
-}
-
-/// Reason why a trial failed.
-#[derive(Clone, Default)]
-pub(super) struct Failure {
-    pub reason: String,
-    pub blockers: Vec<Blocker>,
-    /// Pieces whose division may help, most promising first.
-    pub suspects: Vec<PatchId>,
-    /// Pieces that came out loose in the last kit.
-    pub loose: Vec<PatchId>,
-}
-
-impl Failure {
-    pub fn of(reason: &str) -> Self {
-        Self {
-            reason: reason.to_owned(),
-            ..Self::default()
-        }
-    }
-
-    /// Two pieces never lock: if the key leaves one way, nothing keeps the other piece from leaving the
-    /// opposite way.
-    fn of_two() -> Self {
-        Self {
-            suspects: vec![PatchId(0), PatchId(1)],
-            ..Self::of("two pieces come apart whichever of them is pulled; three can lock")
-        }
-    }
-
-    /// The failure of a later plan, whose blame comes first, with the blame of this one.
-    fn after(&self, later: Self) -> Self {
-        Self {
-            suspects: later.suspects.iter().chain(&self.suspects).copied().collect(),
-            loose: self.loose.clone(),
-            ..later
-        }
     }
 }
 
@@ -302,53 +261,6 @@ pub(super) enum Next {
     Changes(Vec<Change>, Option<Step>),
     /// There is no plan, for this reason.
     None(Failure),
-}
-
-/// Input of the search for a plan.
-pub(super) struct Planning<'a> {
-    pub input: Input<'a>,
-    /// Turn of the model for the division.
-    pub turn: &'a Turn,
-    pub division: &'a Division,
-    /// The division's surface with even triangles.
-    pub even: &'a EvenSurface,
-    pub survey: &'a PlanSurvey,
-    pub constraints: &'a PlanConstraints,
-}
-
-impl Planning<'_> {
-    /// Loads on the kit, in the space of the division.
-    pub fn handling(&self) -> Handling {
-        let params = self.input.params;
-        let up = self.turn.apply(Vec3::from_array(params.up)).to_array();
-        let thickness_mm = self.division.settings.body.thickness_mm;
-        Handling::new(up, thickness_mm, params.material)
-    }
-
-    /// Criteria by which plans are compared.
-    ///
-    /// A climb keeps `reserve_s` back for the kit.
-    pub fn choice<'b>(
-        &'b self,
-        handling: &'b Handling,
-        former: Option<&'b LatticePlan>,
-        reserve_s: f64,
-    ) -> Choice<'b> {
-        Choice {
-            params: &self.division.settings.plan,
-            surface: &self.division.surface,
-            even: self.even,
-            sizes: &self.division.sizes.sizes,
-            survey: self.survey,
-            constraints: self.constraints,
-            handling,
-            climb: ClimbParams {
-                reserve_s,
-                ..ClimbParams::default()
-            },
-            former,
-        }
-    }
 }
 
 /// Returns the division's surface with even triangles, which is made when first needed.

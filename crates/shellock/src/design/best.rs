@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::agenda::{Agenda, Grade};
-use super::attempt::Failure;
+use super::failure::Failure;
 use super::wall::Wall;
 use super::{DesignError, NoPlan};
 use crate::Ctx;

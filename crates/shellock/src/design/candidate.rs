@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use shellock_geom::Solid;
 
 use super::division::Division;
-use super::trial::Job;
+use super::job::Job;
 use super::{DesignError, KeySource, Settings};
 use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
 use crate::piece::Grip;

@@ -1,6 +1,6 @@
 //! One division of the surface into pieces, and the changes of it if no plan succeeds.
 
-use super::attempt::Failure;
+use super::failure::Failure;
 use super::{DesignError, Settings};
 use crate::piece::Grip;
 use crate::sizes::ChosenSizes;

@@ -4,8 +4,9 @@
 use shellock_geom::Solid;
 
 use super::agenda::{Agenda, Allowance, Grade};
-use super::attempt::{Failure, Found};
+use super::attempt::Found;
 use super::candidate;
+use super::failure::Failure;
 use super::trial::{Parts, Trial};
 use super::wall::Wall;
 use super::ways::{self, Input};

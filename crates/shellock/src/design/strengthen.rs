@@ -5,9 +5,9 @@
 
 use super::DesignError;
 use super::agenda::{Allowance, Permit, Step};
-use super::attempt::Planning;
 use super::causes::Cause;
 use super::division::Division;
+use super::planning::Planning;
 use super::trial::Change;
 use super::wall::Thicker;
 use crate::handling::Handling;

@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use kits::*;
 use shellock_geom::{Solid, Vec3};
 
-use super::attempt::Failure;
+use super::failure::Failure;
+use super::job::Job;
 use super::lesson::lessons;
-use super::trial::Job;
 use super::*;
 use crate::Progress;
 use crate::body::BodyError;

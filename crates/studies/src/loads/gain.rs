@@ -17,7 +17,7 @@ use shellock_mechanics::{Drift, SurfaceModel};
 use super::{LoadsOptions, deed};
 use crate::failure::Failure;
 use crate::metrics::{Subject, failed};
-use crate::study::Sheet;
+use crate::sheet::Sheet;
 use crate::table::markdown;
 
 /// Number of plans rated in parallel before the best of them sets the floor for rejecting others.
