@@ -126,7 +126,7 @@ impl<'a> Limits<'a> {
         Self {
             n,
             n_rows,
-            of_single: (n == 6).then(|| wrenches_of_single(&all[..n_rows])),
+            of_single: wrenches_of_single(n, &all[..n_rows]),
             all,
             late: None,
         }
@@ -151,9 +151,10 @@ impl<'a> Limits<'a> {
     }
 }
 
-/// Wrenches of rows that limit a single piece, by coordinate; a row that the piece is the second of has the
-/// opposite sign.
-fn wrenches_of_single(rows: &[Limit]) -> [Vec<f64>; 6] {
+/// Wrenches of `rows`, by coordinate, if they all limit a single piece that has six of `n` unknowns. A row
+/// that the piece is the second of has the opposite sign.
+fn wrenches_of_single(n: usize, rows: &[Limit]) -> Option<[Vec<f64>; 6]> {
+    let is_single = |row: &Limit| [(0, n), (n, 0)].contains(&(row.plus, row.minus));
     let signed = |row: &Limit, k: usize| {
         if row.plus == 0 {
             row.wrench[k]
@@ -161,7 +162,8 @@ fn wrenches_of_single(rows: &[Limit]) -> [Vec<f64>; 6] {
             -row.wrench[k]
         }
     };
-    std::array::from_fn(|k| rows.iter().map(|row| signed(row, k)).collect())
+    (n == 6 && rows.iter().all(is_single))
+        .then(|| std::array::from_fn(|k| rows.iter().map(|row| signed(row, k)).collect()))
 }
 
 /// Number in [0.5, 1) for each `i`, irregularly distributed: the fractions of multiples of the golden ratio.
