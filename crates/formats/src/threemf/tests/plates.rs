@@ -50,10 +50,10 @@ fn instances_that_are_switched_off_count_where_a_plate_names_instances() {
     let bounds = second.mesh.bounds();
     assert_eq!((bounds.min.x, bounds.max.x), (100.0, 210.0));
     assert_note(&second, "excluded from printing in the slicer: 1; left out");
-    assert_note(&second, "2 of 2 objects or parts were taken");
+    assert_note(&second, "2 of 2 objects or parts were used");
     let first = choose(&bytes, None, Some("1")).unwrap_err().to_string();
     assert!(
-        first.contains("plate 1 holds nothing that the slicer is to print") && first.contains("2 \"Big\""),
+        first.contains("plate 1 has nothing to print") && first.contains("2 \"Big\""),
         "{first}"
     );
     let third = choose(&bytes, None, Some("3")).unwrap_err().to_string();
