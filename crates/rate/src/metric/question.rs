@@ -1,4 +1,4 @@
-//! Input of the choice of a plan.
+//! Question to the choice of a plan: the pieces, their plans so far and their loads.
 
 use shellock_plan::sizes::ConnectorSizes;
 use shellock_plan::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey};
