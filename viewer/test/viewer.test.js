@@ -67,7 +67,7 @@ test("the page draws, answers every control and reports no error", { skip: witho
   const own = "rgb(60, 120, 200) rgb(180, 120, 80)";
   const [nothing, size, back] = data("painted").split("|").map((text) => text.trim());
   assert.ok(nothing.startsWith(own) && back.startsWith(own));
-  assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: none$/);
+  assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: no value$/);
   assert.deepEqual(data("moments").replaceAll("&lt;", "<").replaceAll("&gt;", ">").split("|"), ["1 / 2  mesh 0 <b>", "2 / 2  mesh 1 <b>", "2 / 2  mesh 1 <b>"]);
   assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
   assert.ok(!dom.includes('class="modes motions"'), "no motions, no buttons");
