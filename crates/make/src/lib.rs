@@ -13,4 +13,4 @@ pub mod piece;
 mod recipe;
 
 pub use causes::Cause;
-pub use recipe::{MakeError, Recipe, SeamLengths, make, short_connectors};
+pub use recipe::{MakeError, Recipe, make, weak_joints};

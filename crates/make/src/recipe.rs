@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use shellock_assembly::{InstallationPlan, LatticeDirection, PressFitKind};
+use shellock_assembly::{LatticeDirection, PressFitKind};
 use shellock_geom::Aabb;
-use shellock_plan::LatticePlan;
+use shellock_plan::lesson::{Lesson, WeakJoint};
 use shellock_plan::sizes::{CONTACT_SIZES, ConnectorSizes};
+use shellock_plan::{Handover, LatticePlan};
 use shellock_report::{Ctx, IdVec, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
@@ -158,22 +159,17 @@ fn rooms(
     rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
 }
 
-/// Pieces of a pair, the later one first, with the lengths of their connectors and of their seam, mm.
-pub type SeamLengths = ((PatchId, PatchId), [f64; 2]);
-
-/// Finds pairs of pieces whose connectors came out too short to hold them together. Pieces of seams and
-/// joints are those of `plan`.
-pub fn short_connectors<D: Copy>(
-    plan: &InstallationPlan<D>,
+/// Finds pairs of pieces whose connectors came out too short to hold them together. Later plans must not rely
+/// on them along the same direction. Pieces of seams and joints are those of the kit, in the order of
+/// installation.
+pub fn weak_joints(
+    handover: &Handover,
     sizes: &ConnectorSizes,
     contacts: &[SeamRoom],
     joints: &[FinishedJoint],
-) -> Vec<SeamLengths> {
-    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
-    let by_order = |a: PatchId, b: PatchId| match plan.position(a) > plan.position(b) {
-        true => (a, b),
-        false => (b, a),
-    };
+) -> Option<Lesson> {
+    let mut lengths: BTreeMap<[PatchId; 2], [f64; 2]> = BTreeMap::new();
+    let by_order = |a: PatchId, b: PatchId| if a > b { [a, b] } else { [b, a] };
     for contact in contacts {
         let pair = by_order(contact.later, contact.earlier);
         lengths.entry(pair).or_default()[1] += contact.length_mm;
@@ -182,9 +178,20 @@ pub fn short_connectors<D: Copy>(
         let pair = by_order(joint.male, joint.female);
         lengths.entry(pair).or_default()[0] += joint.length_mm;
     }
-    let is_short = |(a, b), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * sizes.of(a, b);
-    lengths
+    let is_short = |[a, b]: [PatchId; 2], length_mm: f64| length_mm < SHORTEST_RUN_SIZES * sizes.of(a, b);
+    let weak: Vec<WeakJoint> = lengths
         .into_iter()
         .filter(|(pair, [length_mm, _])| is_short(*pair, *length_mm))
-        .collect()
+        .map(|(pair, [length_mm, seam_mm])| {
+            let [later, earlier] = pair.map(|piece| handover.patch(piece));
+            WeakJoint {
+                later,
+                earlier,
+                separation: handover.found_plan().separation(later),
+                length_mm,
+                seam_mm,
+            }
+        })
+        .collect();
+    (!weak.is_empty()).then_some(Lesson::WeakJoints(weak))
 }

@@ -1,5 +1,8 @@
 //! Lessons from a plan or a kit that failed, and the constraints on later plans that follow.
 
+mod kit;
+
+pub use kit::of_kit;
 use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
 use shellock_report::PatchId;

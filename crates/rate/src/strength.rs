@@ -25,6 +25,7 @@ pub mod chart;
 mod falls;
 mod hollow;
 mod thin;
+mod wall;
 
 use std::f64::consts::{PI, TAU};
 
@@ -43,6 +44,7 @@ use shellock_mechanics::{LoadCase, ShellError, ShellModel};
 use shellock_report::ParamProblem;
 use shellock_report::{Cancelled, Ctx, Warning};
 pub use thin::SolidRegion;
+pub use wall::decide;
 
 use crate::impact::impact_n;
 
@@ -214,6 +216,12 @@ pub enum StrengthError {
         /// Thickness of the thinnest wall, mm.
         wall_mm: f64,
     },
+    /// Too little of the model can be hollow.
+    #[error(transparent)]
+    TooThin(#[from] TooThin),
+    /// Connectors have no room behind the thinnest walls.
+    #[error(transparent)]
+    NoRoom(#[from] NoRoom),
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

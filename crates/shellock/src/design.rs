@@ -21,7 +21,6 @@ mod division;
 mod failure;
 mod job;
 mod kit;
-mod lesson;
 mod outcome;
 mod outlook;
 mod planning;

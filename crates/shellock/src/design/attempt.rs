@@ -4,10 +4,9 @@ use super::agenda::{Allowance, Step};
 use super::division::{Division, revise};
 use super::failure::Failure;
 use super::kit::{Recipe, make};
-use super::lesson::lessons;
 use super::planning::Planning;
 use super::strengthen::strengthen;
-use super::trial::{Change, Learned, Parts, Setup};
+use super::trial::{Change, Learned, Parts};
 use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
 use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams};
@@ -51,35 +50,12 @@ impl<T> Found<T> {
 /// Makes the kit of the best plan of a trial.
 pub(super) fn make_kit(
     ctx: &Ctx,
-    Parts {
-        job, setup, effort, ..
-    }: Parts<'_, '_>,
+    mut parts: Parts<'_, '_>,
     allowance: &Allowance,
 ) -> Result<Found<Kit>, DesignError> {
     // Warnings of a kit that is given up are dropped with it, so they get a context of their own.
     let kit_ctx = ctx.fork();
-    setup.division.warn(&kit_ctx);
-    setup.survey_plans(ctx)?;
-    effort.plans += 1;
-    let Setup {
-        candidate,
-        division,
-        even,
-        grid,
-        survey,
-        lessons,
-        former,
-    } = setup;
-    let planning = Planning {
-        input: job.input,
-        turn: &candidate.turn,
-        division,
-        even: even_surface(even, division),
-        survey: survey.as_ref().expect("plans were surveyed"),
-        constraints: &lessons.constraints,
-    };
-    let next = next_plan(&kit_ctx, &planning, allowance, former)?;
-    let (chosen, late) = match plan_or_changes(ctx, division, lessons, next, allowance)? {
+    let (choice, late) = match plan_or_changes(ctx, &kit_ctx, &mut parts, allowance)? {
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
@@ -87,59 +63,100 @@ pub(super) fn make_kit(
     if ctx.seconds_left() < allowance.least_kit_s {
         return Err(DesignError::Cancelled(Cancelled));
     }
-    let (params, model) = (&division.settings.body, &*candidate.model);
+    let (input, setup) = (&parts.job.input, parts.setup);
+    let (division, model) = (&setup.division, &*setup.candidate.model);
     ctx.stage("wall", 0)?;
-    let (grid, distances) = grid.measure(params, model, &division.surface)?;
-    let is_hurried = chosen.is_cut_short;
+    let (grid, distances) = setup
+        .grid
+        .measure(&division.settings.body, model, &division.surface)?;
+    let is_hurried = choice.is_cut_short;
     let recipe = Recipe {
-        params: job.input.params,
+        params: input.params,
         division,
-        model: job.input.model,
-        turn: &candidate.turn,
+        model: input.model,
+        turn: &setup.candidate.turn,
         grid,
         distances,
-        choice: chosen,
+        choice,
     };
     let found = match kit_or_lesson(make(kit_ctx, recipe))? {
         Ok(kit) => {
-            effort.kits += 1;
-            learn(ctx, division, lessons, kit, allowance)?
+            parts.effort.kits += 1;
+            learn(ctx, division, &mut setup.lessons, kit, allowance)?
         }
-        Err(lesson) => give_up(ctx, division, lessons, &lesson, allowance)?,
+        Err(lesson) => give_up(ctx, division, &mut setup.lessons, &lesson, allowance)?,
     };
-    let late = late.or(found.late);
-    let is_hurried = is_hurried || found.end.as_ref().is_some_and(Kit::is_hurried);
     Ok(Found {
+        late: late.or(found.late),
+        is_hurried: is_hurried || found.end.as_ref().is_some_and(Kit::is_hurried),
+        ..found
+    })
+}
+
+/// Seeks the plan that a kit would be made of, without making it.
+pub(super) fn seek_plan(
+    ctx: &Ctx,
+    mut parts: Parts<'_, '_>,
+    allowance: &Allowance,
+) -> Result<Found<Planned>, DesignError> {
+    let plan_ctx = ctx.fork();
+    let (choice, late) = match plan_or_changes(ctx, &plan_ctx, &mut parts, allowance)? {
+        Ok(plan) => plan,
+        Err(found) => return Ok(found),
+    };
+    let (turn, surface) = (&parts.setup.candidate.turn, &parts.setup.division.surface);
+    let is_hurried = choice.is_cut_short;
+    let warnings = [plan_ctx.into_warnings(), parts.job.wall.warnings()];
+    Ok(Found {
+        end: Some(Planned::new(turn, surface, choice, warnings)),
         late,
         is_hurried,
-        ..found
+        ..Found::nothing(Failure::default())
     })
 }
 
 /// A plan to make, with the step that a lack of time rules out; or the changes to make instead.
 type Decision<T> = Result<(Chosen, Option<Step>), Found<T>>;
 
-/// Decides on the plan that was sought, or on the changes to make instead.
+/// Seeks the next plan to make, or the changes to make instead. Warnings go to `plan_ctx`.
 fn plan_or_changes<T>(
     ctx: &Ctx,
-    division: &Division,
-    learned: &Learned,
-    next: Next,
+    plan_ctx: &Ctx,
+    Parts {
+        job, setup, effort, ..
+    }: &mut Parts<'_, '_>,
     allowance: &Allowance,
 ) -> Result<Decision<T>, DesignError> {
-    Ok(Err(match next {
-        Next::Plan(chosen, late) => return Ok(Ok((*chosen, late))),
-        Next::Changes(changes, late) => Found {
-            changes,
-            late,
-            ..Found::nothing(Failure::default())
+    setup.division.warn(plan_ctx);
+    setup.survey_plans(plan_ctx)?;
+    effort.plans += 1;
+    let (division, learned) = (&setup.division, &setup.lessons);
+    let edge_share = MetricParams::default().edge_share;
+    let planning = Planning {
+        input: job.input,
+        turn: &setup.candidate.turn,
+        division,
+        even: setup
+            .even
+            .get_or_insert_with(|| EvenSurface::new(&division.surface, edge_share)),
+        survey: setup.survey.as_ref().expect("plans were surveyed"),
+        constraints: &learned.constraints,
+    };
+    Ok(Err(
+        match next_plan(plan_ctx, &planning, allowance, &mut setup.former)? {
+            Next::Plan(choice, late) => return Ok(Ok((*choice, late))),
+            Next::Changes(changes, late) => Found {
+                changes,
+                late,
+                ..Found::nothing(Failure::default())
+            },
+            Next::None(failure) => {
+                let failure = learned.failure.after(failure);
+                let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
+                Found::nothing(failure).with(change)
+            }
         },
-        Next::None(failure) => {
-            let failure = learned.failure.after(failure);
-            let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
-            Found::nothing(failure).with(change)
-        }
-    }))
+    ))
 }
 
 /// Returns the kit, or the lesson of a piece that something blocks.
@@ -201,7 +218,7 @@ fn learn(
         let change = change.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
         Found::nothing(Failure::of("pieces rattle")).with(change)
     } else {
-        let lessons = lessons(&kit);
+        let lessons = kit.lessons();
         learned.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
         for lesson in &lessons {
             learned.add(lesson);
@@ -261,51 +278,6 @@ pub(super) enum Next {
     Changes(Vec<Change>, Option<Step>),
     /// There is no plan, for this reason.
     None(Failure),
-}
-
-/// Returns the division's surface with even triangles, which is made when first needed.
-fn even_surface<'a>(even: &'a mut Option<EvenSurface>, division: &Division) -> &'a EvenSurface {
-    even.get_or_insert_with(|| EvenSurface::new(&division.surface, MetricParams::default().edge_share))
-}
-
-/// Seeks the plan that a kit would be made of, without making it.
-pub(super) fn seek_plan(
-    ctx: &Ctx,
-    Parts {
-        job, setup, effort, ..
-    }: Parts<'_, '_>,
-    allowance: &Allowance,
-) -> Result<Found<Planned>, DesignError> {
-    let plan_ctx = ctx.fork();
-    setup.division.warn(&plan_ctx);
-    setup.survey_plans(&plan_ctx)?;
-    effort.plans += 1;
-    let division = &setup.division;
-    let planning = Planning {
-        input: job.input,
-        turn: &setup.candidate.turn,
-        division,
-        even: even_surface(&mut setup.even, division),
-        survey: setup.survey.as_ref().expect("plans were surveyed"),
-        constraints: &setup.lessons.constraints,
-    };
-    let next = next_plan(&plan_ctx, &planning, allowance, &mut setup.former)?;
-    Ok(
-        match plan_or_changes(ctx, division, &setup.lessons, next, allowance)? {
-            Ok((chosen, late)) => {
-                let is_hurried = chosen.is_cut_short;
-                let warnings = [plan_ctx.into_warnings(), job.wall.warnings()];
-                let planned = Planned::new(&setup.candidate.turn, &division.surface, chosen, warnings);
-                Found {
-                    end: Some(planned),
-                    late,
-                    is_hurried,
-                    ..Found::nothing(Failure::default())
-                }
-            }
-            Err(found) => found,
-        },
-    )
 }
 
 /// Seeks the next plan of a division to make. The climb starts from the `former` strongest plan of the same

@@ -10,6 +10,7 @@ use crate::connector::SeamRoom;
 use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
 use crate::piece::{FinishParams, FinishedJoint, PressFit};
+use crate::plan::lesson::{self, Lesson};
 use crate::plan::{Handover, PlanProof};
 use crate::play::{KitPlay, Rattle};
 use crate::verify::{self, Assembly, Finding, Verification};
@@ -104,6 +105,12 @@ impl Kit {
         let findings = &self.verification.findings;
         let is_all = n_failures == 0 || (n_failures == 1 && findings.iter().all(is_rattle));
         is_all && !self.rattles.is_empty()
+    }
+
+    /// Returns the lessons of a kit that failed, in patches of its division. The last one rejects its plan.
+    pub(super) fn lessons(&self) -> Vec<Lesson> {
+        let weak = || shellock_make::weak_joints(&self.handover, &self.sizes, &self.contacts, &self.joints);
+        lesson::of_kit(&self.verification, &self.handover, &self.surface, weak)
     }
 
     /// Pieces other than the key that rattle, the loosest first. The key is left out because it is cut

@@ -10,7 +10,6 @@ use shellock_geom::{Solid, Vec3};
 
 use super::failure::Failure;
 use super::job::Job;
-use super::lesson::lessons;
 use super::*;
 use crate::Progress;
 use crate::body::BodyError;
@@ -76,14 +75,15 @@ fn a_key_that_rattles_is_nobody_to_join() {
 
 #[test]
 fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
-    assert_eq!(lessons(&good()), []);
+    assert_eq!(good().lessons(), []);
     for failed in [
         loose(1),
         kit_that_rattles(1, 3.0),
         kit(&[("closed", false)], Vec::new()),
     ] {
         let mut constraints = PlanConstraints::default();
-        lessons(&failed)
+        failed
+            .lessons()
             .iter()
             .for_each(|lesson| lesson.teach(&mut constraints));
         assert_eq!(constraints.rejections, [found_plan([0, 1, 2])]);
@@ -111,7 +111,7 @@ fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches
         piece: PatchId(1),
         directions: Vec::new(),
     };
-    let learned = lessons(&handed_over(handover, &[("blocked", false)], vec![finding]));
+    let learned = handed_over(handover, &[("blocked", false)], vec![finding]).lessons();
     assert_eq!(
         learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(),
         [PatchId(0)]
@@ -132,7 +132,7 @@ fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
         at: [0.0; 3],
     };
     let failed = kit(&[("free", false)], vec![rubs]);
-    let learned = lessons(&failed);
+    let learned = failed.lessons();
     assert_eq!(
         learned.iter().flat_map(Lesson::suspects).collect::<Vec<_>>(),
         [PatchId(1)]
@@ -159,7 +159,7 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     };
     let mut failed = loose(1);
     failed.contacts = vec![contact(1, 0)];
-    let learned = lessons(&failed);
+    let learned = failed.lessons();
     let mut constraints = PlanConstraints::default();
     learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     let s = LatticeDirection::nearest(Vec3::Z);
@@ -174,7 +174,7 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     let mut rubs = kit(&[("closed", false)], Vec::new());
     rubs.contacts = vec![contact(1, 0)];
     assert!(
-        lessons(&rubs)
+        rubs.lessons()
             .iter()
             .all(|lesson| !matches!(lesson, Lesson::WeakJoints(_)))
     );

@@ -46,39 +46,28 @@ impl Wall {
     /// connectors, unless the user allows that.
     pub fn decide(ctx: &Ctx, &Input { params, model, .. }: &Input<'_>) -> Result<Self, DesignError> {
         let nominal = Self::nominal(params);
-        let ours = &nominal.settings.strength;
-        if !params.allows_thin {
-            let thinnest_mm = match params.thickness {
-                Thickness::Mm(mm) => mm,
-                Thickness::Auto => ours.thin_mm,
-            };
-            strength::is_hollow(model, thinnest_mm)?;
-            strength::has_room(model, thinnest_mm)?;
-        }
-        let ctx = &ctx.fork();
-        let found = match params.thickness {
-            Thickness::Mm(mm) => strength::stress(ctx, ours, model, mm),
-            Thickness::Auto => strength::thickness(ctx, ours, model),
+        let given_mm = match params.thickness {
+            Thickness::Mm(mm) => Some(mm),
+            Thickness::Auto => None,
         };
-        match found {
-            Ok(strength) => {
-                if !params.allows_thin {
-                    strength::is_hollow(model, strength.thickness_mm)?;
+        let limits = &nominal.settings.strength;
+        Ok(
+            match strength::decide(&ctx.fork(), limits, model, given_mm, params.allows_thin)? {
+                Ok(strength) => {
+                    let mut settings = Settings::with_thickness(params, strength.thickness_mm);
+                    settings.strength.most_mm = strength.most_mm;
+                    Self {
+                        settings,
+                        strength: Some(strength),
+                        ..nominal
+                    }
                 }
-                let mut settings = Settings::with_thickness(params, strength.thickness_mm);
-                settings.strength.most_mm = strength.most_mm;
-                Ok(Self {
-                    settings,
-                    strength: Some(strength),
+                Err(error) => Self {
+                    error: Some(StrengthError::from(error).to_string()),
                     ..nominal
-                })
-            }
-            Err(StrengthError::Shell(e)) => Ok(Self {
-                error: Some(e.to_string()),
-                ..nominal
-            }),
-            Err(e) => Err(e.into()),
-        }
+                },
+            },
+        )
     }
 
     /// This wall for pieces that are cut in another way.
