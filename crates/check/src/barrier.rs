@@ -183,7 +183,7 @@ fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flood
             return Err(format!("a surface goes on to {:.2} mm above", flooded.highest_mm));
         }
         for k in (0..3).filter(|&k| prism.has_part(corners[k], corners[(k + 1) % 3])) {
-            for other in mesh.sharing(t, k) {
+            for other in mesh.triangles_at_edge(t, k) {
                 if !found.contains(&other) {
                     found.push(other);
                 }

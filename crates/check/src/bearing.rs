@@ -44,7 +44,7 @@ impl Bearing {
 
     /// Moves the point onto the surface of `a`. An error if the point is not there, or the surface is too
     /// small.
-    fn located(&self, meshes: &[Mesh]) -> Result<Self, String> {
+    fn locate(&self, meshes: &[Mesh]) -> Result<Self, String> {
         let is_unit = |v: Vec3| (norm(v) - 1.0).abs() <= SAME;
         if !is_unit(self.normal) || !is_unit(self.across) || dot(self.normal, self.across).abs() > SAME {
             return Err("has directions that are no perpendicular unit vectors".into());
@@ -95,12 +95,9 @@ fn exact(normal: Vec3, across: Vec3) -> (Vec3, Vec3) {
 }
 
 /// Moves the points of all bearings onto the pieces' surfaces.
-pub fn located(meshes: &[Mesh], bearings: &[Bearing]) -> Result<Vec<Bearing>, String> {
-    let locate = |(i, bearing): (usize, &Bearing)| {
-        bearing
-            .located(meshes)
-            .map_err(|why| format!("bearing {i} {why}"))
-    };
+pub fn locate_all(meshes: &[Mesh], bearings: &[Bearing]) -> Result<Vec<Bearing>, String> {
+    let locate =
+        |(i, bearing): (usize, &Bearing)| bearing.locate(meshes).map_err(|why| format!("bearing {i} {why}"));
     bearings.iter().enumerate().map(locate).collect()
 }
 
@@ -123,7 +120,7 @@ mod tests {
             normal: [0.0, 0.0, 1.0],
             across: [1.0, 0.0, 0.0],
         };
-        located(&meshes, &[up])
+        locate_all(&meshes, &[up])
     }
 
     #[test]
@@ -150,7 +147,7 @@ mod tests {
             normal: [0.0, 0.0, 1.0],
             across: [1.0, 0.0, 0.0],
         };
-        let is_good = |bearing: Bearing| located(&meshes, &[bearing]).is_ok();
+        let is_good = |bearing: Bearing| locate_all(&meshes, &[bearing]).is_ok();
         assert!(is_good(good.clone()));
         assert!(!is_good(Bearing {
             normal: [0.0, 0.0, 1.00001],

@@ -147,7 +147,7 @@ impl Bounded {
     }
 
     /// Returns the piece if it is free.
-    fn freed(&self, piece: usize) -> Option<usize> {
+    fn if_free(&self, piece: usize) -> Option<usize> {
         self.place(piece).map(|_| piece)
     }
 
@@ -225,7 +225,7 @@ impl Bounded {
     /// Inequality of a bearing: seen from its piece `b`, its point rises no higher than the barrier.
     fn row(&self, kit: &Kit<'_>, &[bearing, cell, turn]: &[usize; 3]) -> Result<Row, String> {
         let b = kit.bearings.get(bearing).ok_or("there is no such bearing")?;
-        let (freed_a, freed_b) = (self.freed(b.a), self.freed(b.b));
+        let (freed_a, freed_b) = (self.if_free(b.a), self.if_free(b.b));
         if freed_a.is_none() && freed_b.is_none() {
             return Err(format!("pieces {} and {} are at rest", b.a, b.b));
         }
@@ -273,8 +273,8 @@ impl Bounded {
         );
         let error_mm = 0.5 * seat * (key_mm + seat_mm) + 0.5 * (key + seat) * key_mm;
         let factors = self.factors(
-            self.freed(slide.key),
-            self.freed(slide.seat),
+            self.if_free(slide.key),
+            self.if_free(slide.seat),
             Some(slide.at),
             slide.along,
         );

@@ -64,7 +64,7 @@ impl Kit<'_> {
                     ),
                 )
             }
-            Claim::Bounded(claim) => self.test_bounded(claim),
+            Claim::Bounded(claim) => self.test_play(claim),
             Claim::KeyLeaves {
                 piece,
                 direction,
@@ -122,7 +122,7 @@ impl Kit<'_> {
     }
 
     /// Tests the bound, and that the play stated to users for a piece is not less.
-    fn test_bounded(&self, claim: &Bounded) -> (String, Tested) {
+    fn test_play(&self, claim: &Bounded) -> (String, Tested) {
         let alone = if let [piece] = claim.free[..] {
             Some(piece)
         } else {
@@ -134,7 +134,7 @@ impl Kit<'_> {
         let together = || {
             format!(
                 "all pieces together stay within their play ({} held)",
-                named(&at_rest)
+                names_of(&at_rest)
             )
         };
         let name = alone.map_or_else(together, within_play);
@@ -200,7 +200,7 @@ fn are(held: &[usize]) -> String {
 }
 
 /// Names of pieces: "piece 8", "pieces 2 and 8".
-fn named(pieces: &[usize]) -> String {
+fn names_of(pieces: &[usize]) -> String {
     let names = pieces
         .iter()
         .map(|&id| number::of(id).to_string())
@@ -260,7 +260,7 @@ mod tests {
     fn findings(certificate: Value) -> Vec<Finding> {
         let c: Certificate = serde_json::from_value(certificate).unwrap();
         let meshes = [hollow(8.0, 5.1), cuboid([-5.0; 3], [5.0; 3])];
-        let bearings = crate::bearing::located(&meshes, &c.bearings);
+        let bearings = crate::bearing::locate_all(&meshes, &c.bearings);
         let kit = Kit {
             c: &c,
             meshes: &meshes,
@@ -337,6 +337,6 @@ mod tests {
     #[test]
     fn pieces_are_named_in_words() {
         assert_eq!([are(&[0]), are(&[1, 2])], ["1 is", "2 and 3 are"]);
-        assert_eq!([named(&[7]), named(&[1, 7])], ["piece 8", "pieces 2 and 8"]);
+        assert_eq!([names_of(&[7]), names_of(&[1, 7])], ["piece 8", "pieces 2 and 8"]);
     }
 }

@@ -256,7 +256,7 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
     };
     let is_whole = add("the certificate speaks of this plan", test_plan(c, plan))
         & add("every claim that a kit needs is made", test_completeness(c));
-    add("the kit passed the tests of its maker", test_passed(c));
+    add("the kit passed the tests of its maker", test_failures(c));
     let (meshes, files) = pieces::read(folder, &c.pieces);
     let is_read = add("the files are those that were certified", files);
     if !is_whole || (!is_read && meshes.len() < c.pieces.len()) {
@@ -270,11 +270,11 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
     }
     if !add(
         "each piece is one closed surface around a volume",
-        pieces::test_closed(&meshes),
+        pieces::test_surfaces(&meshes),
     ) {
         return findings;
     }
-    let contacts = located(c, &meshes);
+    let contacts = locate_contacts(c, &meshes);
     let told = |contacts: &Vec<Contact>| {
         format!(
             "{} contacts, up to {:.3} mm apart",
@@ -286,7 +286,7 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
         "the contacts lie on both pieces' surfaces",
         contacts.as_ref().map(told).map_err(String::clone),
     );
-    let bearings = bearing::located(&meshes, &c.bearings);
+    let bearings = bearing::locate_all(&meshes, &c.bearings);
     if !c.bearings.is_empty() {
         let told = |bearings: &Vec<Bearing>| format!("{} bearings", bearings.len());
         add(
@@ -413,7 +413,7 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
 }
 
 /// Checks that the maker's own tests found nothing wrong.
-fn test_passed(c: &Certificate) -> Tested {
+fn test_failures(c: &Certificate) -> Tested {
     if c.failed.is_empty() {
         Ok("nothing failed".into())
     } else {
@@ -462,8 +462,8 @@ fn test_completeness(c: &Certificate) -> Tested {
     Ok(format!("{} claims", c.claims.len()))
 }
 
-/// Contacts, with the points and normals of the triangles that they really lie on.
-fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
+/// Returns the contacts with the points and normals of the triangles that they really lie on.
+fn locate_contacts(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
     if c.reach_mm > c.clearance_mm + MOST_REACH_MM + SAME {
         return Err(format!("contacts {} mm apart hold nothing", c.reach_mm));
     }

@@ -201,7 +201,7 @@ mod tests {
         [of_cube.concat(), of_key.concat(), on_side(1, KEY, 0.0, 0, 1.0)].concat()
     }
 
-    fn tested(contacts: &[Contact], held: &[usize], key: usize, hold: f64) -> Tested {
+    fn test_hold(contacts: &[Contact], held: &[usize], key: usize, hold: f64) -> Tested {
         let multipliers: Vec<(usize, f64)> = (0..contacts.len()).map(|i| (i, 1.0)).collect();
         test(
             &FRAME,
@@ -219,24 +219,24 @@ mod tests {
     fn greatest_hold(contacts: &[Contact]) -> f64 {
         let steps = (0..20_000).map(|i| f64::from(i) * 0.001).skip(1);
         steps
-            .take_while(|&hold| tested(contacts, &[0], KEY, hold).is_ok())
+            .take_while(|&hold| test_hold(contacts, &[0], KEY, hold).is_ok())
             .last()
             .unwrap_or(0.0)
     }
 
     #[test]
     fn a_cube_behind_a_sliding_key_is_held_and_the_key_is_not() {
-        let told = tested(&contacts(), &[0], KEY, 0.5).unwrap();
+        let told = test_hold(&contacts(), &[0], KEY, 0.5).unwrap();
         assert!(
             told.contains("hold 0.5000, 36 contacts; others move by up to "),
             "{told}"
         );
         assert!(
-            tested(&contacts(), &[0], 1, 0.1).is_err(),
+            test_hold(&contacts(), &[0], 1, 0.1).is_err(),
             "the key moves while the cube counts as free"
         );
         let greatest = greatest_hold(&contacts());
-        assert!(tested(&contacts(), &[0], KEY, 1.01 * greatest).is_err());
+        assert!(test_hold(&contacts(), &[0], KEY, 1.01 * greatest).is_err());
         assert!((0.5..5.0).contains(&greatest), "{greatest}");
     }
 
@@ -254,7 +254,7 @@ mod tests {
     fn a_cube_that_can_follow_the_key_is_not_held() {
         let along_z = |c: &Contact| c.a == 1 && c.normal[2] != 0.0;
         let loose: Vec<Contact> = contacts().into_iter().filter(|c| !along_z(c)).collect();
-        assert!(tested(&loose, &[0], KEY, 1e-3).is_err());
+        assert!(test_hold(&loose, &[0], KEY, 1e-3).is_err());
     }
 
     #[test]

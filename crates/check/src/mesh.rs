@@ -93,7 +93,7 @@ impl Mesh {
     }
 
     /// Triangles that share the edge of side `k` of triangle `t`: `t` itself, and those on the other side.
-    pub fn sharing(&self, t: usize, k: usize) -> impl Iterator<Item = usize> {
+    pub fn triangles_at_edge(&self, t: usize, k: usize) -> impl Iterator<Item = usize> {
         let edges = self.edges();
         let [from, to] = edges.of_side[3 * t + k];
         edges.all[from..to].iter().map(|e| e.side / 3)
@@ -302,8 +302,8 @@ pub mod tests {
         assert_eq!((cube.n_open_edges(), cube.n_surfaces()), (0, 1));
         assert_eq!(hollow(2.0, 1.0).n_surfaces(), 2);
         for (t, k) in (0..12).flat_map(|t| (0..3).map(move |k| (t, k))) {
-            assert_eq!(cube.sharing(t, k).count(), 2);
-            assert!(cube.sharing(t, k).any(|other| other == t));
+            assert_eq!(cube.triangles_at_edge(t, k).count(), 2);
+            assert!(cube.triangles_at_edge(t, k).any(|other| other == t));
         }
         let (_, on) = cube.on_surface([0.3, 0.4, 1.00005]).unwrap();
         assert!(distance(on, [0.3, 0.4, 1.0]) < 1e-12);

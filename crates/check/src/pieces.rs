@@ -45,7 +45,7 @@ pub fn test_files(folder: &Path, files: &[OtherFile]) -> Tested {
 }
 
 /// Checks that every piece is one closed surface, right side out.
-pub fn test_closed(meshes: &[Mesh]) -> Tested {
+pub fn test_surfaces(meshes: &[Mesh]) -> Tested {
     for (id, mesh) in meshes.iter().enumerate() {
         let (n_open, n_surfaces, volume_mm3) = (mesh.n_open_edges(), mesh.n_surfaces(), mesh.volume_mm3());
         if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {

@@ -15,7 +15,7 @@ use shellock::{Ctx, Direction, IdVec, InstallationPlan, InstallationStep, PatchI
 use shellock_check::{Finding, Verdict, check};
 use shellock_formats::write_stl_binary;
 use shellock_geom::{Solid, TriMesh, Vec3, Volume};
-use shellock_testkit::shapes::{ALL, PinnedLid, as_written, brick, room};
+use shellock_testkit::shapes::{ALL, PinnedLid, brick, room, rounded_mesh};
 
 const CLEARANCE_MM: f64 = 0.1;
 const RIM_MM: f64 = 1.0;
@@ -66,7 +66,7 @@ fn make() -> Made {
 
 /// Kit of three parts that leave along `ways`, in the order of their numbers; the last one is the key.
 fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
-    let pieces: IdVec<PatchId, TriMesh> = parts.iter().map(as_written).collect();
+    let pieces: IdVec<PatchId, TriMesh> = parts.iter().map(rounded_mesh).collect();
     let steps = ways.iter().copied().enumerate();
     let steps = steps.map(|(i, d)| InstallationStep {
         piece: i.into(),
@@ -134,7 +134,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
 }
 
 /// Claims that are refuted after `change` has been applied to the kit.
-fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
+fn refutations(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let (mut certificate, mut plan) = made_kit(folder.path());
     change(folder.path(), &mut certificate, &mut plan);
@@ -151,7 +151,7 @@ fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
 
 /// Replaces a piece by `mesh`, and updates its hash.
 fn replace(folder: &Path, certificate: &mut Value, piece: usize, mesh: &Volume) {
-    let bytes = write_stl_binary(&as_written(mesh));
+    let bytes = write_stl_binary(&rounded_mesh(mesh));
     fs::write(folder.join(format!("{piece}.stl")), &bytes).unwrap();
     certificate["pieces"][piece]["sha256"] = sha256(&bytes).into();
 }
@@ -177,7 +177,7 @@ const COMPLETE: &str = "every claim that a kit needs is made";
 
 #[test]
 fn a_kit_as_it_was_made_is_confirmed() {
-    assert_eq!(refuted(|_, _, _| {}), [""; 0]);
+    assert_eq!(refutations(|_, _, _| {}), [""; 0]);
 }
 
 #[test]
@@ -189,13 +189,13 @@ fn a_changed_byte_of_a_piece_is_seen() {
         bytes[84 + 12] ^= 1;
         fs::write(path, bytes).unwrap();
     };
-    assert!(refuted(change).contains(&FILES.to_owned()));
+    assert!(refutations(change).contains(&FILES.to_owned()));
 }
 
 #[test]
 fn a_piece_moved_by_less_than_a_clearance_or_two_is_off_its_contacts() {
     for step in [Vec3::X, Vec3::Y, Vec3::Z] {
-        let lost = refuted(|folder, certificate, _| {
+        let lost = refutations(|folder, certificate, _| {
             replace(folder, certificate, 1, &parts()[1].translate(step * 0.2));
         });
         assert!(
@@ -208,7 +208,7 @@ fn a_piece_moved_by_less_than_a_clearance_or_two_is_off_its_contacts() {
 
 #[test]
 fn a_piece_without_its_connector_is_off_its_contacts() {
-    let lost = refuted(|folder, certificate, _| {
+    let lost = refutations(|folder, certificate, _| {
         let bare = parts()[1].intersect(&brick(
             [-1.0, 31.0],
             [-1.0, 31.0],
@@ -224,14 +224,14 @@ fn a_piece_without_its_connector_is_off_its_contacts() {
 
 #[test]
 fn a_changed_multiplier_or_a_dropped_contact_leaves_no_equilibrium() {
-    let changed = refuted(|_, certificate, _| {
+    let changed = refutations(|_, certificate, _| {
         let (list, greatest) = multipliers(certificate);
         list[greatest][1] = (1.001 * list[greatest][1].as_f64().unwrap()).into();
     });
     assert_eq!(changed, [LOCK]);
-    let negative = refuted(|_, certificate, _| multipliers(certificate).0[0][1] = (-1.0).into());
+    let negative = refutations(|_, certificate, _| multipliers(certificate).0[0][1] = (-1.0).into());
     assert_eq!(negative, [LOCK]);
-    let dropped = refuted(|_, certificate, _| {
+    let dropped = refutations(|_, certificate, _| {
         let (list, greatest) = multipliers(certificate);
         list.remove(greatest);
     });
@@ -241,7 +241,7 @@ fn a_changed_multiplier_or_a_dropped_contact_leaves_no_equilibrium() {
 #[test]
 fn forces_in_equilibrium_along_one_line_hold_nothing_else() {
     // One pair of opposed contacts has multipliers without residual, but no rank.
-    let lost = refuted(|_, certificate, _| {
+    let lost = refutations(|_, certificate, _| {
         let of = |c: &Value, k: &str| c[k].clone();
         let mut back = certificate["contacts"][0].clone();
         (back["a"], back["b"]) = (of(&back, "b"), of(&back, "a"));
@@ -254,7 +254,7 @@ fn forces_in_equilibrium_along_one_line_hold_nothing_else() {
 
 #[test]
 fn a_turned_normal_is_not_that_of_the_piece() {
-    let lost = refuted(|_, certificate, _| certificate["contacts"][0]["normal"] = json!([0.6, 0.0, 0.8]));
+    let lost = refutations(|_, certificate, _| certificate["contacts"][0]["normal"] = json!([0.6, 0.0, 0.8]));
     assert_eq!(lost[0], CONTACTS);
 }
 
@@ -271,8 +271,8 @@ fn a_changed_direction_is_not_the_plans_and_not_free() {
             .unwrap();
         claim["direction"] = turned.clone();
     };
-    assert_eq!(refuted(|_, certificate, _| turn(certificate)), [PLAN]);
-    let both = refuted(|_, certificate, plan| {
+    assert_eq!(refutations(|_, certificate, _| turn(certificate)), [PLAN]);
+    let both = refutations(|_, certificate, plan| {
         turn(certificate);
         plan["pieces"][1]["installation_direction"] = turned.clone();
     });
@@ -281,14 +281,14 @@ fn a_changed_direction_is_not_the_plans_and_not_free() {
 
 #[test]
 fn a_missing_piece_or_claim_is_missed() {
-    let lost = refuted(|folder, _, _| fs::remove_file(folder.join("1.stl")).unwrap());
+    let lost = refutations(|folder, _, _| fs::remove_file(folder.join("1.stl")).unwrap());
     assert_eq!(lost, [FILES]);
-    let unlisted = refuted(|_, certificate, _| {
+    let unlisted = refutations(|_, certificate, _| {
         certificate["pieces"].as_array_mut().unwrap().remove(1);
     });
     assert!(unlisted.contains(&PLAN.to_owned()));
     for claim in 0..7 {
-        let silent = refuted(|_, certificate, _| {
+        let silent = refutations(|_, certificate, _| {
             certificate["claims"].as_array_mut().unwrap().remove(claim);
         });
         // A claim of play may be missing: play without a proof is reported as unproven.
@@ -299,7 +299,7 @@ fn a_missing_piece_or_claim_is_missed() {
             "{claim}: {silent:?}"
         );
     }
-    let more = refuted(|_, certificate, _| {
+    let more = refutations(|_, certificate, _| {
         let claims = certificate["claims"].as_array_mut().unwrap();
         let lock = claims[0].clone();
         claims.extend(vec![lock; 100]);
@@ -309,15 +309,15 @@ fn a_missing_piece_or_claim_is_missed() {
 
 #[test]
 fn an_open_piece_and_overlapping_pieces_are_refuted() {
-    let open = refuted(|folder, certificate, _| {
-        let mut mesh = as_written(&parts()[2]);
+    let open = refutations(|folder, certificate, _| {
+        let mut mesh = rounded_mesh(&parts()[2]);
         mesh.triangles.pop();
         let bytes = write_stl_binary(&mesh);
         fs::write(folder.join("2.stl"), &bytes).unwrap();
         certificate["pieces"][2]["sha256"] = sha256(&bytes).into();
     });
     assert!(open.contains(&BODIES.to_owned()));
-    let thick = refuted(|folder, certificate, _| {
+    let thick = refutations(|folder, certificate, _| {
         replace(
             folder,
             certificate,
@@ -334,12 +334,12 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
 /// Both halves of a piece are closed, and their faces are unchanged except for the cut.
 #[test]
 fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
-    let sawn = refuted(|folder, certificate, _| {
+    let sawn = refutations(|folder, certificate, _| {
         let slab = brick([-1.0, 31.0], [24.0, 24.5], [-1.0, 31.0]);
         replace(folder, certificate, 0, &parts()[0].subtract(&slab));
     });
     assert_eq!(sawn, [BODIES]);
-    let hollow = refuted(|folder, certificate, _| {
+    let hollow = refutations(|folder, certificate, _| {
         replace(
             folder,
             certificate,
@@ -352,8 +352,8 @@ fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
 
 #[test]
 fn what_keeps_rays_from_being_cast_is_refuted() {
-    let far = refuted(|folder, certificate, _| {
-        let mut mesh = as_written(&parts()[1]);
+    let far = refutations(|folder, certificate, _| {
+        let mut mesh = rounded_mesh(&parts()[1]);
         mesh.points.push(Vec3::new(1e30, 0.0, 0.0));
         let far = mesh.points.len() as u32 - 1;
         mesh.triangles.push([far; 3]);
@@ -362,7 +362,7 @@ fn what_keeps_rays_from_being_cast_is_refuted() {
         certificate["pieces"][1]["sha256"] = sha256(&bytes).into();
     });
     assert_eq!(far, [FILES]);
-    let untold = refuted(|_, certificate, _| {
+    let untold = refutations(|_, certificate, _| {
         let claims = certificate["claims"].as_array_mut().unwrap();
         claims
             .iter_mut()
@@ -374,18 +374,18 @@ fn what_keeps_rays_from_being_cast_is_refuted() {
 
 #[test]
 fn a_kit_that_failed_or_has_wide_gaps_or_files_elsewhere_is_refuted() {
-    let failed = refuted(|_, certificate, _| certificate["failed"] = json!(["outer surface kept: 92 %"]));
+    let failed = refutations(|_, certificate, _| certificate["failed"] = json!(["outer surface kept: 92 %"]));
     assert_eq!(failed, ["the kit passed the tests of its maker"]);
-    let wide = refuted(|_, certificate, plan| {
+    let wide = refutations(|_, certificate, plan| {
         (certificate["clearance_mm"], plan["clearance"]) = (5.0.into(), 5.0.into());
     });
     assert!(wide.contains(&PLAN.to_owned()), "{wide:?}");
-    let outside = refuted(|folder, certificate, plan| {
+    let outside = refutations(|folder, certificate, plan| {
         let name = format!("../{}/1.stl", folder.file_name().unwrap().to_str().unwrap());
         (certificate["pieces"][1]["file"], plan["pieces"][1]["file"]) = (name.as_str().into(), name.into());
     });
     assert_eq!(outside, [FILES]);
-    let other = refuted(|folder, certificate, _| {
+    let other = refutations(|folder, certificate, _| {
         fs::write(folder.join("assembly.3mf"), "junk").unwrap();
         certificate["files"] = json!([{ "file": "assembly.3mf", "sha256": sha256(b"as it was") }]);
     });
@@ -425,7 +425,7 @@ fn a_first_piece_that_comes_off_is_not_certified() {
 #[test]
 fn a_gap_that_is_told_wrong_or_at_another_place_is_refuted() {
     let change = |claim: &'static str, with: &dyn Fn(&mut Value)| {
-        refuted(|_, certificate, _| {
+        refutations(|_, certificate, _| {
             let mut claims = certificate["claims"].as_array_mut().unwrap().iter_mut();
             with(&mut claims.find(|c| c["claim"] == claim).unwrap()["least"]["beneath_rim"]);
         })
@@ -472,7 +472,7 @@ fn what_is_no_certificate_is_an_error() {
 #[test]
 fn what_is_done_to_a_piece_refutes_its_play() {
     let by = |change: &dyn Fn(&Volume) -> Volume| {
-        refuted(|folder, certificate, _| replace(folder, certificate, 1, &change(&parts()[1])))
+        refutations(|folder, certificate, _| replace(folder, certificate, 1, &change(&parts()[1])))
     };
     let turned = by(&|lid| {
         let (sin, cos) = 10f64.to_radians().sin_cos();
@@ -516,16 +516,16 @@ fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
         );
     };
     let scaled = |value: &mut Value, by: f64| *value = (value.as_f64().unwrap() * by).into();
-    let smaller = refuted(|_, c, _| claim(c, &|b| scaled(&mut b["quantities"][0]["most"][0][1], 0.9)));
+    let smaller = refutations(|_, c, _| claim(c, &|b| scaled(&mut b["quantities"][0]["most"][0][1], 0.9)));
     assert_eq!(smaller, [LID]);
-    let lighter = refuted(|_, c, _| {
+    let lighter = refutations(|_, c, _| {
         claim(c, &|b| {
             let rows = b["multipliers"][1][0][1].as_array_mut().unwrap();
             rows.iter_mut().for_each(|row| scaled(&mut row[1], 0.9));
         });
     });
     assert_eq!(lighter, [LID]);
-    let told = refuted(|_, c, _| scaled(&mut c["pieces"][1]["play"]["translation_mm"], 0.5));
+    let told = refutations(|_, c, _| scaled(&mut c["pieces"][1]["play"]["translation_mm"], 0.5));
     assert_eq!(told, [LID]);
 }
 

@@ -13,7 +13,7 @@ fn shellock(folder: &Path, args: &str) -> Output {
         .expect("the program runs")
 }
 
-fn told(o: &Output) -> String {
+fn output_of(o: &Output) -> String {
     String::from_utf8_lossy(&o.stdout).into_owned() + &String::from_utf8_lossy(&o.stderr)
 }
 
@@ -27,8 +27,8 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
     fs::write(dir.path().join("models/junk.stl"), "solid\n").unwrap();
     let job = format!("batch models --out kits {options}");
     let first = shellock(dir.path(), &job);
-    assert_eq!(first.status.code(), Some(1), "{}", told(&first));
-    let said = told(&first);
+    assert_eq!(first.status.code(), Some(1), "{}", output_of(&first));
+    let said = output_of(&first);
     assert!(
         said.contains("below/vase.stl verified") && said.contains("junk.stl refused"),
         "{said}"
@@ -59,10 +59,10 @@ fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
             .contains("below/vase/pieces.png")
     );
     // A second run makes nothing. A kit that was deleted, or that has other options, is made again.
-    let again = told(&shellock(dir.path(), &job));
+    let again = output_of(&shellock(dir.path(), &job));
     assert_eq!(again.matches("as it was").count(), 2, "{again}");
     fs::remove_dir_all(dir.path().join("kits/below/vase")).unwrap();
-    let third = told(&shellock(dir.path(), &format!("{job} --seed 1")));
+    let third = output_of(&shellock(dir.path(), &format!("{job} --seed 1")));
     assert!(
         third.contains("vase.stl verified") && !third.contains("as it was"),
         "{third}"
@@ -120,8 +120,8 @@ fn a_folder_without_models_and_options_that_are_wrong_are_refused_at_once() {
     fs::create_dir(dir.path().join("models")).unwrap();
     let refused = |args: &str, says: &str| {
         let o = shellock(dir.path(), args);
-        assert_eq!(o.status.code(), Some(2), "{}", told(&o));
-        assert!(told(&o).contains(says), "{}", told(&o));
+        assert_eq!(o.status.code(), Some(2), "{}", output_of(&o));
+        assert!(output_of(&o).contains(says), "{}", output_of(&o));
     };
     refused("batch models --out kits", "contains no model");
     refused("batch nowhere --out kits", "nowhere");

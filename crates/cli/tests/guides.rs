@@ -76,7 +76,7 @@ fn commands(guide: &str) -> Vec<String> {
 }
 
 /// Options to add to the program's arguments.
-fn added(args: &[&str]) -> Vec<String> {
+fn more_options(args: &[&str]) -> Vec<String> {
     let has = |option: &str| args.contains(&option);
     let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
     match args[0] {
@@ -135,7 +135,7 @@ fn run(folder: &Path, command: &str, is_in_full: bool) -> Result<(), String> {
         .current_dir(folder)
         .args(&args)
         .args(if is_in_full {
-            added(&args)
+            more_options(&args)
         } else {
             vec!["--help".to_owned()]
         })

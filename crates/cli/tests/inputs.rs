@@ -31,13 +31,14 @@ fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
     a
 }
 
-fn changed(change: impl Fn(&mut TriMesh)) -> TriMesh {
+/// Makes a ball and applies `change` to it.
+fn ball_with(change: impl Fn(&mut TriMesh)) -> TriMesh {
     let mut mesh = ball(Vec3::ZERO);
     change(&mut mesh);
     mesh
 }
 
-fn scaled(mesh: &TriMesh, factor: f64, by: Vec3) -> TriMesh {
+fn scale(mesh: &TriMesh, factor: f64, by: Vec3) -> TriMesh {
     let mut mesh = mesh.clone();
     mesh.points.iter_mut().for_each(|p| *p = factor * *p + by);
     mesh
@@ -204,10 +205,10 @@ fn odd_text_files(good: &TriMesh) -> Vec<Twin> {
         ("utf16.obj", utf16(&obj(good)), Sound),
         (
             "far.obj",
-            obj(&scaled(good, 1.0, Vec3::splat(1e9))).into_bytes(),
+            obj(&scale(good, 1.0, Vec3::splat(1e9))).into_bytes(),
             Sound,
         ),
-        ("metres.ply", ply(&scaled(good, 1e-3, Vec3::ZERO)), Sound),
+        ("metres.ply", ply(&scale(good, 1e-3, Vec3::ZERO)), Sound),
     ]
 }
 
@@ -288,7 +289,7 @@ fn narrow_cracks() -> TriMesh {
 
 /// The ball with a triangle divided at an edge that its neighbour keeps.
 fn split_edge() -> TriMesh {
-    changed(|m| {
+    ball_with(|m| {
         let [a, b, c] = m.triangles[0];
         m.points.push(0.5 * (m.points[a as usize] + m.points[b as usize]));
         let middle = m.points.len() as u32 - 1;
@@ -312,19 +313,19 @@ fn turn_inside_out(mut mesh: TriMesh) -> TriMesh {
 /// Files that are broken or odd in their surface.
 fn odd_surfaces() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
-    let inner = scaled(&good, 0.3, Vec3::ONE);
-    let speck = scaled(&good, 0.001, Vec3::splat(29.0));
+    let inner = scale(&good, 0.3, Vec3::ONE);
+    let speck = scale(&good, 0.001, Vec3::splat(29.0));
     vec![
         ("unwelded.ply", ply(&loose_triangles()), Sound),
         ("cracks.ply", ply(&narrow_cracks()), Repaired(&["points-merged"])),
         (
             "copies.ply",
-            ply(&changed(|m| m.triangles.extend_from_within(..50))),
+            ply(&ball_with(|m| m.triangles.extend_from_within(..50))),
             Repaired(&["copies-removed"]),
         ),
         (
             "turned.ply",
-            ply(&changed(|m| {
+            ply(&ball_with(|m| {
                 m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1))
             })),
             Repaired(&["triangles-turned"]),
@@ -336,12 +337,12 @@ fn odd_surfaces() -> Vec<Twin> {
         ),
         (
             "one_missing.ply",
-            ply(&changed(|m| m.triangles.truncate(511))),
+            ply(&ball_with(|m| m.triangles.truncate(511))),
             Repaired(&["holes-closed"]),
         ),
         (
             "open.ply",
-            ply(&changed(|m| m.triangles.truncate(300))),
+            ply(&ball_with(|m| m.triangles.truncate(300))),
             Refused(&["not closed", "1 hole", "near ("]),
         ),
         ("edge.ply", ply(&split_edge()), Repaired(&["edges-joined"])),
@@ -373,7 +374,7 @@ fn odd_surfaces() -> Vec<Twin> {
         ("soup.ply", ply(&soup()), Refused(&["are not connected"])),
         (
             "thin.ply",
-            ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))),
+            ply(&ball_with(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))),
             Sound,
         ),
     ]
@@ -437,10 +438,10 @@ fn sizes_follow_units_and_thin_models_are_warned_of() {
         )
         .contains("60.0 × 60.0 × 60.0 mm")
     );
-    let metres = ply(&scaled(&good, 1e-3, Vec3::ZERO));
+    let metres = ply(&scale(&good, 1e-3, Vec3::ZERO));
     assert!(said("m.ply", metres.clone(), &[]).contains("60 mm if the unit is m "));
     assert!(said("m.ply", metres, &["--unit", "m"]).contains("60.0 × 60.0 × 60.0 mm"));
-    let thin = ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02)));
+    let thin = ply(&ball_with(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02)));
     let warned = said("thin.ply", thin, &[]);
     assert!(
         warned.contains("warning: ") && warned.contains("thinner than two walls of 1.6 mm"),
@@ -490,7 +491,7 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
 #[test]
 fn a_model_too_thin_to_be_hollow_is_refused_at_once_with_what_would_do() {
     let dir = tempfile::tempdir().unwrap();
-    let plate = changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02));
+    let plate = ball_with(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02));
     fs::write(dir.path().join("plate.stl"), write_stl_binary(&plate)).unwrap();
     let o = shellock(dir.path(), &["build", "plate.stl", "-o", "kit"]);
     let said = String::from_utf8_lossy(&o.stderr).into_owned();
@@ -534,7 +535,7 @@ fn a_division_is_told_in_figures_and_is_the_one_that_segment_makes() {
 }
 
 /// Ball of 60 mm with walls of 2.4 mm and a hole of 4 mm underneath.
-fn drained() -> TriMesh {
+fn hollow_ball() -> TriMesh {
     let [outer, inner] = [30.0, 27.6].map(|radius| {
         let ball = shapes::ball(4, Vec3::ZERO, radius);
         shellock_geom::Volume::from_closed_mesh(&ball).unwrap()
@@ -553,7 +554,7 @@ fn drained() -> TriMesh {
 #[test]
 fn a_hollow_model_is_told_with_its_wall_and_opening_and_filled_if_asked() {
     let dir = tempfile::tempdir().unwrap();
-    fs::write(dir.path().join("drained.stl"), write_stl_binary(&drained())).unwrap();
+    fs::write(dir.path().join("drained.stl"), write_stl_binary(&hollow_ball())).unwrap();
     for command in [
         &["inspect", "drained.stl"][..],
         &["build", "drained.stl", "-o", "kit"],

@@ -10,7 +10,7 @@ fn guide() -> String {
 }
 
 /// Output of the program's `words`.
-fn said(words: &[&str]) -> String {
+fn output_of(words: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_shellock"))
         .args(words)
         .output()
@@ -20,7 +20,7 @@ fn said(words: &[&str]) -> String {
 }
 
 /// Long names of the options that a help text explains.
-fn explained(help: &str) -> Vec<String> {
+fn options_in(help: &str) -> Vec<String> {
     let lines = help.lines().map(str::trim_start);
     let lines = lines.filter(|line| line.starts_with('-'));
     let names = lines.filter_map(|line| line.split([' ', ',', '=']).find(|word| word.starts_with("--")));
@@ -50,7 +50,7 @@ fn every_option_of_the_help_is_in_the_section_of_its_command() {
         .skip(2)
         .filter_map(|text| text.split_once('\n'))
     {
-        for option in explained(&said(&[name, "--help-all"])) {
+        for option in options_in(&output_of(&[name, "--help-all"])) {
             let has =
                 |text: &str| text.contains(&format!("`{option}`")) || text.contains(&format!("`{option} "));
             let takes_shared = section.contains("options of [build](#build)") && has(build);
@@ -63,7 +63,7 @@ fn every_option_of_the_help_is_in_the_section_of_its_command() {
 
 #[test]
 fn every_command_has_a_section() {
-    let help = said(&["--help-all"]);
+    let help = output_of(&["--help-all"]);
     let commands = help
         .split("Commands:\n")
         .nth(1)

@@ -78,16 +78,16 @@ impl Case {
 
 /// Body of 512 triangles, 60 × 40 × 30 mm.
 fn body() -> TriMesh {
-    scaled(&shapes::ball(3, Vec3::ZERO, 1.0), Vec3::new(30.0, 20.0, 15.0))
+    scale(&shapes::ball(3, Vec3::ZERO, 1.0), Vec3::new(30.0, 20.0, 15.0))
 }
 
-fn scaled(mesh: &TriMesh, by: Vec3) -> TriMesh {
+fn scale(mesh: &TriMesh, by: Vec3) -> TriMesh {
     let mut mesh = mesh.clone();
     mesh.points.iter_mut().for_each(|p| *p *= by);
     mesh
 }
 
-fn moved(mesh: &TriMesh, by: Vec3) -> TriMesh {
+fn shift(mesh: &TriMesh, by: Vec3) -> TriMesh {
     let mut mesh = mesh.clone();
     mesh.points.iter_mut().for_each(|p| *p += by);
     mesh

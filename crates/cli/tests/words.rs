@@ -11,7 +11,7 @@ fn shellock(folder: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
-fn said(o: &Output) -> String {
+fn output_of(o: &Output) -> String {
     String::from_utf8_lossy(&o.stdout).into_owned() + &String::from_utf8_lossy(&o.stderr)
 }
 
@@ -34,18 +34,18 @@ const COMMANDS: [&str; 12] = [
 fn the_help_of_every_command_fits_a_screen_and_has_an_example_where_it_makes_something() {
     let dir = tempfile::tempdir().unwrap();
     for command in COMMANDS {
-        let help = said(&shellock(dir.path(), &[command, "--help"]));
+        let help = output_of(&shellock(dir.path(), &[command, "--help"]));
         assert!(help.lines().count() <= 60, "{command}: {}", help.lines().count());
         assert!(help.contains("Usage: shellock"), "{command}");
-        let all = said(&shellock(dir.path(), &[command, "--help-all"]));
+        let all = output_of(&shellock(dir.path(), &[command, "--help-all"]));
         assert!(all.len() >= help.len(), "{command}");
     }
     for command in ["build", "demo", "segment", "plan", "inspect", "test"] {
-        let help = said(&shellock(dir.path(), &[command, "-h"]));
+        let help = output_of(&shellock(dir.path(), &[command, "-h"]));
         assert!(help.contains(&format!("  shellock {command} ")), "{command}");
     }
     // Options that dividing does not use are not in its help.
-    let segment = said(&shellock(dir.path(), &["segment", "--help-all"]));
+    let segment = output_of(&shellock(dir.path(), &["segment", "--help-all"]));
     assert!(!segment.contains("--no-booklet") && segment.contains("--keep-whole"));
 }
 
@@ -54,7 +54,7 @@ fn lengths_take_units_and_slips_are_told_what_was_meant() {
     let dir = tempfile::tempdir().unwrap();
     let figure = |size: &str| shellock(dir.path(), &["figure", "vase", "--size", size, "-o", "vase.stl"]);
     assert!(figure("6cm").status.success());
-    let wrong = said(&figure("6furlong"));
+    let wrong = output_of(&figure("6furlong"));
     assert!(wrong.contains("--size") && wrong.contains("15cm"), "{wrong}");
     for (args, meant) in [
         (["--printer", "fmd"], "did you mean fdm?"),
@@ -63,7 +63,7 @@ fn lengths_take_units_and_slips_are_told_what_was_meant() {
     ] {
         let o = shellock(dir.path(), &["demo", args[0], args[1], "-o", "kit"]);
         assert_eq!(o.status.code(), Some(2));
-        assert!(said(&o).contains(meant), "{}", said(&o));
+        assert!(output_of(&o).contains(meant), "{}", output_of(&o));
     }
 }
 
@@ -75,7 +75,7 @@ fn a_kit_ends_with_one_verdict_and_tells_five_warnings_at_most() {
         "kit",
     ];
     let o = shellock(dir.path(), &args);
-    let (out, all) = (String::from_utf8_lossy(&o.stdout).into_owned(), said(&o));
+    let (out, all) = (String::from_utf8_lossy(&o.stdout).into_owned(), output_of(&o));
     let told = out
         .lines()
         .filter(|l| ["note: ", "warning: "].iter().any(|s| l.starts_with(s)));

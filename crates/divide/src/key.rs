@@ -29,7 +29,7 @@ mod tests;
 
 pub use conditions::{KeyConditions, conditions, warn_of_conditions};
 pub use faces::FaceSet;
-pub use imprint::{imprint, imprint_refined, patch_in};
+pub use imprint::{imprint, imprint_and_refine, patch_in};
 pub use prism::KeyPrism;
 use serde::{Deserialize, Serialize};
 pub use shellock_surface::Turn;

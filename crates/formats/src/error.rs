@@ -83,14 +83,14 @@ pub enum ReadError {
         at: Place,
     },
     /// A wrong word or number in place of an expected one.
-    #[error("{at}: expected {expected}, found \"{found}\"; correct it there or export the file again")]
+    #[error("{at}: expected {syntax}, found \"{text}\"; correct it there or export the file again")]
     Malformed {
         /// Place of the wrong text.
         at: Place,
         /// Description of the expected text.
-        expected: &'static str,
+        syntax: &'static str,
         /// Text found there, shortened.
-        found: String,
+        text: String,
     },
     /// A 3MF that requires an unsupported extension: its shape would be wrong without.
     #[error(

@@ -82,14 +82,14 @@ pub(super) fn quote(word: &[u8]) -> String {
     format!("\"{}\"", excerpt(word))
 }
 
-/// Creates the error "expected … found …", with `found` shortened and made printable.
-pub(super) fn syntax_error(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
-    let shown = excerpt(found);
-    let ellipsis = if found.len() > shown.len() { "…" } else { "" };
+/// Creates the error "expected … found …", with `text` shortened and made printable.
+pub(super) fn syntax_error(at: Place, syntax: &'static str, text: &[u8]) -> ReadError {
+    let shown = excerpt(text);
+    let ellipsis = if text.len() > shown.len() { "…" } else { "" };
     ReadError::Malformed {
         at,
-        expected,
-        found: shown + ellipsis,
+        syntax,
+        text: shown + ellipsis,
     }
 }
 

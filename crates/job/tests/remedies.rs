@@ -22,7 +22,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// Words of a text that follow `--`.
-fn named(text: &str) -> impl Iterator<Item = &str> {
+fn option_names(text: &str) -> impl Iterator<Item = &str> {
     let is_name = |c: char| c.is_ascii_lowercase() || c == '-';
     let after = text.match_indices("--").map(|(at, _)| &text[at + 2..]);
     let names = after.map(move |rest| &rest[..rest.find(|c| !is_name(c)).unwrap_or(rest.len())]);
@@ -36,7 +36,7 @@ fn every_option_that_a_message_names_exists() {
     let mut n_named = 0;
     for file in files {
         let text = fs::read_to_string(&file).unwrap();
-        for name in named(&text) {
+        for name in option_names(&text) {
             let is_known = declaration(name).is_some() || OF_PROGRAM.contains(&name);
             assert!(is_known, "{}: --{name}", file.display());
             n_named += 1;

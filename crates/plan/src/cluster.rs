@@ -37,14 +37,14 @@ pub struct LoosePart {
 /// Finds a part that comes loose while the key is held; `None` if the plan locks. `n_pieces` ≤
 /// [`PieceSet::MAX_PIECES`].
 pub fn loose_part(n_pieces: usize, joints: &[DirectedJoint], key: PatchId) -> Option<LoosePart> {
-    loose_part_fused(n_pieces, joints, key, PieceSet::EMPTY)
+    loose_part_as_one(n_pieces, joints, key, PieceSet::EMPTY)
 }
 
 /// Runs the test of [`loose_part`] with the pieces of `fused` moving as one.
 ///
 /// A part that is loose here stays loose whatever joints the fused pieces get later, so a search may stop
 /// there.
-pub(super) fn loose_part_fused(
+pub(super) fn loose_part_as_one(
     n_pieces: usize,
     joints: &[DirectedJoint],
     key: PatchId,
@@ -196,7 +196,7 @@ mod tests {
             let joints = random_joints(6, &mut rng);
             let fused: PieceSet = (3..6).map(PatchId).collect();
             let known: Vec<_> = joints.iter().copied().filter(|j| j.later.0 < 3).collect();
-            if loose_part_fused(6, &known, PatchId(0), fused).is_some() {
+            if loose_part_as_one(6, &known, PatchId(0), fused).is_some() {
                 assert!(loose_part(6, &joints, PatchId(0)).is_some());
             }
         }

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use shellock_assembly::LatticeDirection;
 use shellock_report::PatchId;
 
-use super::cluster::{DirectedJoint, loose_part_fused};
+use super::cluster::{DirectedJoint, loose_part_as_one};
 use super::key::KeyChoice;
 use super::local_cost::directions_in;
 use super::score::just_above;
@@ -127,7 +127,7 @@ impl Draw<'_> {
             self.removals.push(LatticeStep { piece, separation });
             self.separations[usize::from(piece)] = Some(separation);
             // A part that is loose already, with the rest as one block, can never lock.
-            let holds = loose_part_fused(self.space.n, &self.joints, self.key.piece, rest).is_none();
+            let holds = loose_part_as_one(self.space.n, &self.joints, self.key.piece, rest).is_none();
             let attached = attached.union(self.space.joint_partners(piece, separation, rest));
             if holds && self.descend(rest, attached) {
                 return true;

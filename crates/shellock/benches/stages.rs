@@ -140,13 +140,22 @@ fn choice_of_plan(bencher: Bencher) {
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn body(bencher: Bencher) {
     let k = kit();
-    bencher.bench_local(|| made::split(&k.settings, &k.surface, &k.sizes, &k.grid, &k.distances, &k.found));
+    bencher.bench_local(|| {
+        made::split(
+            &k.settings,
+            &k.surface,
+            &k.sizes,
+            &k.grid,
+            &k.distances,
+            &k.lattice_plan,
+        )
+    });
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn connectors(bencher: Bencher) {
     let k = kit();
-    bencher.bench_local(|| made::runs(&k.settings, &k.sizes, &k.grid, &k.shell, &k.found));
+    bencher.bench_local(|| made::runs(&k.settings, &k.sizes, &k.grid, &k.shell, &k.lattice_plan));
 }
 
 #[divan::bench(sample_count = 3, sample_size = 1)]
@@ -159,7 +168,7 @@ fn pieces(bencher: Bencher) {
             &k.sizes,
             &k.grid,
             &k.shell,
-            &k.found,
+            &k.lattice_plan,
             &k.runs,
         )
     });
@@ -176,7 +185,7 @@ fn verification(bencher: Bencher) {
 fn gaps(bencher: Bencher) {
     let k = kit();
     let (model, rim_mm) = (Some(squirrel()), k.settings.body.rim_mm);
-    bencher.bench_local(|| kit_gaps(&Ctx::quiet(), model, &k.finished.meshes, &k.plan, rim_mm));
+    bencher.bench_local(|| kit_gaps(&Ctx::quiet(), model, &k.pieces.meshes, &k.plan, rim_mm));
 }
 
 #[divan::bench(sample_count = 3, sample_size = 1)]
@@ -186,7 +195,7 @@ fn pictures(bencher: Bencher) {
         number: step.piece.number(),
         name: format!("piece {}", step.piece),
         color: color(order),
-        mesh: &k.finished.meshes[step.piece],
+        mesh: &k.pieces.meshes[step.piece],
         installation_direction: (-step.separation.unit()).to_array(),
         order,
         is_key: step.piece == k.plan.key(),

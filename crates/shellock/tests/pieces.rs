@@ -48,7 +48,7 @@ const CELLS_ACROSS: f64 = 2.0;
 #[test]
 fn no_point_of_a_piece_is_outside_of_the_model() {
     let distance = SignedDistance::new(egg());
-    for (p, mesh) in kit().finished.meshes.iter() {
+    for (p, mesh) in kit().pieces.meshes.iter() {
         for &point in &mesh.points {
             let depth_mm = distance.at(point, 10.0).map_or(10.0, |d| d.signed_mm);
             assert!(depth_mm > -SKIN_MM, "piece {p} at {point}: {depth_mm} mm");
@@ -62,7 +62,7 @@ fn every_outer_triangle_lies_on_its_own_patch_of_the_model_and_together_they_are
     let model = TriangleBvh::new(&surface.mesh);
     let across_mm = CELLS_ACROSS * kit.settings.body.cell_mm();
     let mut skin_mm2 = vec![0.0; surface.n_patches];
-    for (p, mesh) in kit.finished.meshes.iter() {
+    for (p, mesh) in kit.pieces.meshes.iter() {
         let own: Vec<usize> = (0..surface.patch_of_face.len())
             .filter(|&f| surface.patch_of_face[f] == p)
             .collect();
@@ -116,9 +116,9 @@ fn a_plan_expects_no_longer_runs_than_angles_ends_and_turns_allow() {
     let found = contacts(&kit.settings.plan, &kit.surface, &kit.surface.seams(), &kit.sizes);
     assert!(found.len() >= 12, "octants meet along twelve seams");
     let inner = kit.shell.inner.as_ref().unwrap();
-    let curves = connector::curves(&kit.grid, inner, &kit.found);
+    let curves = connector::curves(&kit.grid, inner, &kit.lattice_plan);
     let in_free_space = |_, _| Some(true);
-    let (params, plan) = (&kit.settings.connector, &kit.found);
+    let (params, plan) = (&kit.settings.connector, &kit.lattice_plan);
     let (runs, _) = connector::runs(params, &kit.sizes, plan, &curves, None, &in_free_space);
     for contact in &found {
         let pair = [contact.a, contact.b];

@@ -35,8 +35,8 @@ fn labels() -> Vec<usize> {
     (0..solid.mesh().triangles.len()).filter_map(nearest).collect()
 }
 
-/// The pebble turned, shifted and divided along its labels, renamed to `names`.
-fn divided(turn: &LatticeTurn, shift: Vec3, names: &[usize]) -> SegmentedSurface {
+/// Turns and shifts the pebble, and divides it along its labels, renamed to `names`.
+fn divide(turn: &LatticeTurn, shift: Vec3, names: &[usize]) -> SegmentedSurface {
     let solid = Solid::new(turn.mesh(pebble().mesh(), shift)).unwrap();
     let named: Vec<i64> = labels().iter().map(|&l| names[l] as i64).collect();
     segment(
@@ -48,13 +48,13 @@ fn divided(turn: &LatticeTurn, shift: Vec3, names: &[usize]) -> SegmentedSurface
     .unwrap()
 }
 
-fn as_given() -> &'static SegmentedSurface {
+fn original() -> &'static SegmentedSurface {
     static GIVEN: LazyLock<SegmentedSurface> =
-        LazyLock::new(|| divided(&LatticeTurn::all()[0], Vec3::ZERO, &Vec::from_iter(0..N)));
+        LazyLock::new(|| divide(&LatticeTurn::all()[0], Vec3::ZERO, &Vec::from_iter(0..N)));
     &GIVEN
 }
 
-fn surveyed(surface: &SegmentedSurface) -> PlanSurvey {
+fn survey_of(surface: &SegmentedSurface) -> PlanSurvey {
     let params = PlanParams::default();
     survey(
         &Ctx::quiet(),
@@ -66,13 +66,13 @@ fn surveyed(surface: &SegmentedSurface) -> PlanSurvey {
     .unwrap()
 }
 
-fn survey_as_given() -> &'static PlanSurvey {
-    static GIVEN: LazyLock<PlanSurvey> = LazyLock::new(|| surveyed(as_given()));
+fn survey_of_original() -> &'static PlanSurvey {
+    static GIVEN: LazyLock<PlanSurvey> = LazyLock::new(|| survey_of(original()));
     &GIVEN
 }
 
 /// Renames the `i`-th piece of the surface to `number[i]`.
-fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface {
+fn renumber(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface {
     let new = |&p: &PatchId| PatchId::from(number[usize::from(p)]);
     SegmentedSurface {
         patch_of_face: surface.patch_of_face.iter().map(new).collect(),
@@ -83,7 +83,7 @@ fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface 
 /// Asserts that `other` has the contacts, areas and mean normals of the original pebble, with piece `i`
 /// renamed to `number[i]` and all directions turned.
 fn assert_same_contacts(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize], tolerance: f64) {
-    let given = survey_as_given();
+    let given = survey_of_original();
     assert_eq!(other.contacts.len(), given.contacts.len());
     let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
     let is_near = |a: f64, b: f64| (a - b).abs() <= tolerance * a.abs().max(1.0);
@@ -115,7 +115,7 @@ fn assert_same_contacts(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]
 
 /// Greatest difference between the occlusion shares of the original and the turned pebble.
 fn farthest_share(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]) -> f64 {
-    let given = survey_as_given();
+    let given = survey_of_original();
     let new = |p: usize| PatchId::from(number[p]);
     let mut farthest = 0.0f64;
     for (p, q) in (0..N)
@@ -151,10 +151,10 @@ proptest! {
     fn a_division_along_labels_is_the_same_however_the_model_lies_and_its_labels_are_named(
         turn in turns(), shift in vectors(80.0), names in orders(N),
     ) {
-        let surface = divided(&turn, shift, &names);
-        prop_assert_eq!(surface.n_patches, as_given().n_patches);
+        let surface = divide(&turn, shift, &names);
+        prop_assert_eq!(surface.n_patches, original().n_patches);
         assert_valid(&surface, pebble().volume());
-        let (areas, given) = (surface.areas(), as_given().areas());
+        let (areas, given) = (surface.areas(), original().areas());
         for (label, &name) in names.iter().enumerate() {
             let (a, b) = (areas[PatchId::from(name)], given[PatchId::from(label)]);
             prop_assert!((a / b - 1.0).abs() < 1e-6, "label {}: {} mm² and {} mm²", label, a, b);
@@ -174,9 +174,9 @@ proptest! {
 
     #[test]
     fn what_seams_offer_and_what_is_in_the_way_turn_with_the_model(turn in turns()) {
-        let mut turned = as_given().clone();
+        let mut turned = original().clone();
         turned.mesh = turn.mesh(&turned.mesh, Vec3::ZERO);
-        let survey = surveyed(&turned);
+        let survey = survey_of(&turned);
         let same = Vec::from_iter(0..N);
         assert_same_contacts(&survey, &turn, &same, 1e-6);
         // Pictures have pixels, so they turn only approximately with the model.
@@ -186,15 +186,15 @@ proptest! {
 
     #[test]
     fn a_plan_costs_the_same_however_its_pieces_are_numbered(number in orders(N), seed in 0..1000u64) {
-        let survey = surveyed(&renumbered(as_given(), &number));
+        let survey = survey_of(&renumber(original(), &number));
         let none = LatticeTurn::all()[0];
         assert_same_contacts(&survey, &none, &number, 1e-9);
         prop_assert!(farthest_share(&survey, &none, &number) < 1e-9);
         let params = PlanParams { seed, ..PlanParams::default() };
-        for plan in random_plans(&params, survey_as_given(), 20) {
+        for plan in random_plans(&params, survey_of_original(), 20) {
             let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
             let other = LatticePlan::new(plan.steps.iter().map(|s| (new(s.piece), s.separation)));
-            let one = score(survey_as_given(), &PlanConstraints::default(), &plan);
+            let one = score(survey_of_original(), &PlanConstraints::default(), &plan);
             let two = score(&survey, &PlanConstraints::default(), &other);
             prop_assert!((one.worst - two.worst).abs() < 1e-9, "{:?} {:?}", one, two);
             for (p, cost) in one.pieces.iter() {

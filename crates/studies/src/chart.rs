@@ -7,7 +7,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use crate::failure::Failure;
-use crate::statistics::{BandPoint, kendall, normalised, spearman};
+use crate::statistics::{BandPoint, kendall, normalise, spearman};
 
 const SIZE_PX: (u32, u32) = (900, 600);
 const MARGIN_PX: u32 = 18;
@@ -83,8 +83,8 @@ pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Fail
     };
     svg(
         &labels,
-        padded(x.iter().copied()),
-        padded(y.iter().copied()),
+        padded_range(x.iter().copied()),
+        padded_range(y.iter().copied()),
         None,
         |plane| {
             let dots = x
@@ -109,8 +109,8 @@ pub fn bands(
     let x = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
         (l.min(p.x), h.max(p.x))
     });
-    let y = padded(points().flat_map(|p| [p.low, p.high]).chain(optimum));
-    svg(labels, widened(x.0, x.1), y, Some(legend.into()), |plane| {
+    let y = padded_range(points().flat_map(|p| [p.low, p.high]).chain(optimum));
+    svg(labels, widen(x.0, x.1), y, Some(legend.into()), |plane| {
         for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
             let steps = as_steps(&curve.points);
             let below = steps.iter().map(|p| (p.x, p.low));
@@ -143,13 +143,13 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
     });
     svg(
         labels,
-        widened(1.0, order.len() as f64),
+        widen(1.0, order.len() as f64),
         -PADDING..1.0 + PADDING,
         Some(Corner::LowerRight.into()),
         |plane| {
             // The first column, which the others should follow, is drawn last and so on top.
             for (i, (name, values)) in columns.iter().enumerate().rev() {
-                let values = normalised(values);
+                let values = normalise(values);
                 let line = order
                     .iter()
                     .enumerate()
@@ -167,7 +167,7 @@ pub fn intervals(labels: &Labels<'_>, intervals: &[Interval]) -> Result<String, 
     let most = intervals.iter().map(|i| i.high).fold(0.0, f64::max);
     svg(
         labels,
-        widened(0.0, (1.0 + PADDING) * most),
+        widen(0.0, (1.0 + PADDING) * most),
         0.0..n.max(1.0),
         None,
         |plane| {
@@ -286,16 +286,17 @@ fn tick(value: &f64) -> String {
     }
 }
 
-fn padded(values: impl Iterator<Item = f64>) -> Range<f64> {
+fn padded_range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
         (l.min(v), h.max(v))
     });
     let padding = PADDING * (high - low);
-    widened(low - padding, high + padding)
+    widen(low - padding, high + padding)
 }
 
-/// Range from `low` to `high`, widened if it is empty or not finite, because a chart needs some width.
-fn widened(low: f64, high: f64) -> Range<f64> {
+/// Returns the range from `low` to `high`, or a wider one if it is empty or not finite, because a chart needs
+/// some width.
+fn widen(low: f64, high: f64) -> Range<f64> {
     match (low.is_finite() && high.is_finite(), low < high) {
         (false, _) => 0.0..1.0,
         (true, true) => low..high,

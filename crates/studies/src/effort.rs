@@ -70,7 +70,7 @@ pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure>
         models.extend(models_in(path)?);
     }
     if options.hard {
-        models.extend(written(&folder.join("hard"))?);
+        models.extend(write_family(&folder.join("hard"))?);
     }
     let jobs: Vec<(PathBuf, f64)> = models
         .iter()
@@ -118,7 +118,7 @@ fn models_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Writes the hard family as files and returns their paths.
-fn written(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+fn write_family(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let wrong = |path: &Path| {
         let path = path.to_owned();
         move |source| Failure::File { path, source }
@@ -181,7 +181,7 @@ fn one(options: &EffortOptions, folder: &Path, model: &Path, size_mm: f64) -> Re
         exit_code: ended,
         seconds,
         peak_mb,
-        ..told(&answer, &events)
+        ..read_run(&answer, &events)
     })
 }
 
@@ -198,7 +198,7 @@ fn resident_mb(pid: u32) -> f64 {
 }
 
 /// Reads the results of a job from the program's answer and events.
-fn told(answer: &str, events: &str) -> Run {
+fn read_run(answer: &str, events: &str) -> Run {
     let answer: Value = answer.lines().last().map_or(Value::Null, json);
     let events: Vec<Value> = events.lines().map(json).collect();
     let of = |kind: &'static str| events.iter().filter(move |e| e["event"] == kind);
@@ -315,13 +315,13 @@ mod tests {
             "\n",
             r#"{"event":"effort","stages":[{"name":"plan","cpu_seconds":2.0},{"name":"cut","cpu_seconds":3.0}]}"#
         );
-        let run = told(answer, events);
+        let run = read_run(answer, events);
         assert_eq!(
             (run.kits, run.last.as_str(), run.cpu_seconds),
             (Some(3), "fails: b", 5.0)
         );
         assert_eq!(run.stages[0].0, "cut");
         assert_eq!(run.notes, ["another plan"]);
-        assert_eq!(told("", "").last, "no answer");
+        assert_eq!(read_run("", "").last, "no answer");
     }
 }

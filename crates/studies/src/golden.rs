@@ -33,7 +33,7 @@ pub struct Options {
 
 /// Compares with the goldens, or rewrites them; returns the files written.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
-    let program = options.program.clone().map_or_else(built, Ok)?;
+    let program = options.program.clone().map_or_else(build_program, Ok)?;
     let mut changes = Vec::new();
     let mut written = Vec::new();
     for cases in [golden::QUICK.as_slice(), &golden::FIGURES] {
@@ -155,7 +155,7 @@ fn on_threads(
 }
 
 /// Builds the program from this source tree and returns its path.
-fn built() -> Result<PathBuf, Failure> {
+fn build_program() -> Result<PathBuf, Failure> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let failed = |problem: String| Failure::Program {
         program: "cargo build".into(),

@@ -54,7 +54,7 @@ fn circle(radius_mm: f64, z: f64) -> Vec<Vec3> {
 }
 
 /// Solid of revolution about z; `profile` gives radius and height, mm, from below.
-fn turned(profile: &[[f64; 2]]) -> Volume {
+fn revolve(profile: &[[f64; 2]]) -> Volume {
     Volume::loft(&profile.iter().map(|&[r, z]| circle(r, z)).collect::<Vec<_>>())
 }
 
@@ -109,7 +109,7 @@ fn goblet(wall_mm: f64) -> Volume {
         bowl(110.0, 42.0),
         [40.0 - wall_mm, 160.0],
     ];
-    turned(&outer).subtract(&turned(&inner))
+    revolve(&outer).subtract(&revolve(&inner))
 }
 
 /// Solid cup with a foot, a belly that bulges over its neck by `bulge_mm`, and two round handles.
@@ -126,7 +126,7 @@ fn two_handled_cup(bulge_mm: f64) -> Volume {
         [40.0, 150.0],
     ];
     let handles = [-40.0, 40.0].map(|x| ring(Vec3::new(x, 0.0, 98.0), 26.0, 6.5));
-    Volume::union_all([turned(&body)].into_iter().chain(handles).collect())
+    Volume::union_all([revolve(&body)].into_iter().chain(handles).collect())
 }
 
 /// Round ring that stands upright, with its axis along y.
@@ -152,7 +152,7 @@ fn open_box(wall_mm: f64) -> Volume {
 }
 
 fn pierced_statue(n_holes: usize) -> Volume {
-    let body = turned(&[
+    let body = revolve(&[
         [24.0, 0.0],
         [18.0, 20.0],
         [22.0, 80.0],

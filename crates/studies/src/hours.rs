@@ -260,14 +260,14 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
                 .iter()
                 .map(|s| {
                     let (with, without) = (told(s.with), told(s.without));
-                    let (told, of) = if is_own {
+                    let (total, of) = if is_own {
                         (without, without)
                     } else {
                         (with - without, with)
                     };
                     Fitted {
                         amounts: amounts(s)[range.clone()].to_vec(),
-                        told,
+                        total,
                         of,
                     }
                 })
@@ -284,7 +284,7 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
 /// One equation of the fit; errors count as shares of `of`.
 struct Fitted {
     amounts: Vec<f64>,
-    told: f64,
+    total: f64,
     of: f64,
 }
 
@@ -292,7 +292,7 @@ fn fit_row(names: &[&str], fitted: &[Fitted]) -> Vec<String> {
     let prices = least_squares(fitted);
     let mut errors: Vec<f64> = fitted
         .iter()
-        .map(|f| (estimate(f, &prices) - f.told).abs() / f.of)
+        .map(|f| (estimate(f, &prices) - f.total).abs() / f.of)
         .collect();
     errors.sort_by(f64::total_cmp);
     let at = |share: f64| {
@@ -325,7 +325,7 @@ fn least_squares(fitted: &[Fitted]) -> Vec<f64> {
     let products: Vec<Vec<f64>> = (0..n)
         .map(|i| (0..n).map(|j| sum(&|f| f.amounts[i] * f.amounts[j])).collect())
         .collect();
-    let told: Vec<f64> = (0..n).map(|i| sum(&|f| f.amounts[i] * f.told)).collect();
+    let told: Vec<f64> = (0..n).map(|i| sum(&|f| f.amounts[i] * f.total)).collect();
     let mut prices = vec![0.0; n];
     for _ in 0..ROUNDS {
         for i in 0..n {
@@ -414,7 +414,7 @@ mod tests {
     fn least_squares_find_what_made_the_figures_and_nothing_below_zero() {
         let made = |a: f64, b: f64| Fitted {
             amounts: vec![a, b, a * b],
-            told: 2.0 * a + 0.5 * b,
+            total: 2.0 * a + 0.5 * b,
             of: 1.0,
         };
         let fitted = [made(1.0, 2.0), made(3.0, 1.0), made(2.0, 5.0), made(4.0, 4.0)];
@@ -425,7 +425,7 @@ mod tests {
         );
         let falling = [1.0, 2.0].map(|a| Fitted {
             amounts: vec![a],
-            told: -a,
+            total: -a,
             of: 1.0,
         });
         assert_eq!(least_squares(&falling), [0.0]);

@@ -78,7 +78,7 @@ fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
         let plan = |i: usize| rows.iter().map(|r| of(r)[i]).fold(f64::INFINITY, f64::min);
         (0..n_plans).map(plan).collect()
     };
-    let mut table: Vec<Vec<String>> = rows.iter().map(said).collect();
+    let mut table: Vec<Vec<String>> = rows.iter().map(cells_of).collect();
     let (surface, solid) = (least(|r| &r.surface), least(|r| &r.solid));
     table.push(line("least of all", &surface, &solid));
     let head = [
@@ -105,7 +105,7 @@ fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
 }
 
 fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure> {
-    let failed = |e| crate::metrics::failed("surface", &e);
+    let failed = |e| crate::metrics::failure_of("surface", &e);
     let start = Instant::now();
     let model = subject.model.surface_model().map_err(failed)?;
     let drifts: Vec<Drift> = cases.par_iter().map(|case| model.drift(&case.forces_n)).collect();
@@ -147,7 +147,7 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
 }
 
 fn by_solid(subject: &Subject, rows: &mut [Row]) -> Result<(), Failure> {
-    let failed = |e| crate::metrics::failed("volume", &e);
+    let failed = |e| crate::metrics::failure_of("volume", &e);
     let model = volume_model(&subject.model).map_err(failed)?;
     let forces: Vec<_> = rows.iter().map(|r| r.case.forces_n.clone()).collect();
     let start = Instant::now();
@@ -184,7 +184,7 @@ fn factors(
         .collect())
 }
 
-fn said(row: &Row) -> Vec<String> {
+fn cells_of(row: &Row) -> Vec<String> {
     let yields = row
         .stations
         .iter()

@@ -19,7 +19,7 @@ use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};
 use crate::sheet::{Sheet, write_all};
 use crate::table::Table;
 use column::Column;
-pub use column::failed;
+pub use column::failure_of;
 
 /// Number of plans on which linearity in Young's modulus is tested.
 const N_LINEAR: usize = 3;

@@ -105,7 +105,7 @@ const PICTURES: [Picture; 16] = [
     },
     Picture {
         file: "docs/pictures/stress-test.svg",
-        make: |source| mechanics::tested(source.kit()?),
+        make: |source| mechanics::comparison(source.kit()?),
     },
     Picture {
         file: "docs/pictures/plates.svg",

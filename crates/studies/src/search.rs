@@ -37,7 +37,7 @@ pub struct SearchOptions {
 /// A divided model and its best known plan.
 struct Subject {
     name: String,
-    divided: Divided,
+    division: Divided,
     /// Parameters with the key of the best plan, so that all searches look for plans with the same key.
     params: PlanParams,
     best: Box<FoundPlan>,
@@ -108,7 +108,7 @@ fn subject(
     );
     Ok(Subject {
         name,
-        divided,
+        division: divided,
         params,
         best,
     })
@@ -188,7 +188,7 @@ fn of_segmentations(
                 continue;
             }
         };
-        let (n_pieces, best) = (subject.divided.surface.n_patches, &subject.best);
+        let (n_pieces, best) = (subject.division.surface.n_patches, &subject.best);
         let (cost, bound) = (best.score.worst, best.lower_bound);
         found.push(Interval {
             name: format!("{n_pieces} pieces, seed {seed}"),
@@ -239,7 +239,7 @@ fn runs_of(
     let found = runs(
         ctx,
         &subject.params,
-        &subject.divided.survey,
+        &subject.division.survey,
         technique,
         seeds,
         options.evaluations,

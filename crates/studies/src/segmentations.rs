@@ -38,9 +38,9 @@ pub struct SegmentationsOptions {
 /// One division of the model, or the reason why there is none.
 struct Row {
     method: Method,
-    asked: Option<usize>,
+    n_pieces: Option<usize>,
     seconds: f64,
-    made: Result<Made, String>,
+    division: Result<Made, String>,
 }
 
 /// A division with its best plan, or the reason why it has none.
@@ -93,7 +93,7 @@ fn curves(
     rows: &[Row],
 ) -> Result<Vec<Sheet>, Failure> {
     let curve = |row: &Row| {
-        let made = row.made.as_ref().ok()?;
+        let made = row.division.as_ref().ok()?;
         let plan = made.plan.as_ref().ok()?;
         let label = format!("{}, {} pieces", row.method.name(), made.figures.n_pieces);
         (!plan.runs.iter().any(Vec::is_empty)).then(|| (label, plan.runs.clone()))
@@ -131,9 +131,9 @@ fn row(
     });
     let row = Row {
         method,
-        asked,
+        n_pieces: asked,
         seconds: begun.elapsed().as_secs_f64(),
-        made,
+        division: made,
     };
     eprintln!("{}", cells(&row).join(" | "));
     row
@@ -183,7 +183,7 @@ fn plan(
         options.evaluations,
     );
     let (cost, lower_bound) = (found.score.worst, found.lower_bound);
-    let (play, least_use) = held(ctx, &settings, params, divided, found)?;
+    let (play, least_use) = play_and_use(ctx, &settings, params, divided, found)?;
     Ok(Plan {
         cost,
         lower_bound,
@@ -194,7 +194,7 @@ fn plan(
 }
 
 /// Predicted play of the steadiest plan found, and the least load factor after a climb from there.
-fn held(
+fn play_and_use(
     ctx: &Ctx<'_>,
     settings: &Settings,
     params: &Params,
@@ -250,9 +250,9 @@ const HEAD: [&str; 14] = [
 ];
 
 fn cells(row: &Row) -> Vec<String> {
-    let mut cells = vec![row.method.name().to_owned(), asked_of(row.asked)];
+    let mut cells = vec![row.method.name().to_owned(), asked_of(row.n_pieces)];
     let percent = |share: f64| format!("{:.0}", 100.0 * share);
-    let made = match &row.made {
+    let made = match &row.division {
         Ok(made) => made,
         Err(why) => {
             cells.extend(std::iter::repeat_n(String::new(), 10));
@@ -306,13 +306,13 @@ fn table(rows: &[Row]) -> Table {
     ];
     let mut columns: Vec<(String, Vec<f64>)> = names.map(|n| (n.into(), Vec::new())).into();
     for row in rows {
-        let Ok(made) = &row.made else { continue };
+        let Ok(made) = &row.division else { continue };
         let method = Method::ALL.iter().position(|m| *m == row.method);
         let DivisionFigures { seams, contacts, .. } = &made.figures;
         let of_plan = |get: &dyn Fn(&Plan) -> f64| made.plan.as_ref().map_or(f64::NAN, get);
         let values = [
             method.unwrap_or_default() as f64,
-            row.asked.unwrap_or_default() as f64,
+            row.n_pieces.unwrap_or_default() as f64,
             made.figures.n_pieces as f64,
             seams.length_mm,
             seams.concave_share,

@@ -57,7 +57,7 @@ fn are_comparable(a: &[f64], b: &[f64]) -> bool {
 }
 
 /// Values shifted and scaled to [0, 1], the least at 0; all 0.5 if they are equal.
-pub fn normalised(values: &[f64]) -> Vec<f64> {
+pub fn normalise(values: &[f64]) -> Vec<f64> {
     let (low, high) = values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {

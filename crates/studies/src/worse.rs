@@ -13,6 +13,7 @@ use shellock::{Ctx, InstallationPlan};
 use shellock_volume::compare::compare;
 
 use crate::failure::Failure;
+use crate::metrics::failure_of;
 use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};
 use crate::sheet::write_all;
 use crate::table::markdown;
@@ -41,8 +42,8 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
     let handling = Handling::new(params.up, settings.plan.wall_mm, params.material);
     let found = match search(&ctx, &settings.plan, &survey, &constraints) {
         Ok(PlanOutcome::Found(found)) => *found,
-        Ok(_) => return Err(crate::metrics::failed("search", &"no plan keeps all conditions")),
-        Err(e) => return Err(crate::metrics::failed("search", &e)),
+        Ok(_) => return Err(failure_of("search", &"no plan keeps all conditions")),
+        Err(e) => return Err(failure_of("search", &e)),
     };
     let choice = Choice {
         params: &settings.plan,
@@ -56,8 +57,7 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
         climb: ClimbParams::default(),
     };
     let foresight = Foresight::of(&choice, &found);
-    let chosen =
-        choose(&ctx, &choice, &foresight, found).map_err(|e| crate::metrics::failed("choice", &e))?;
+    let chosen = choose(&ctx, &choice, &foresight, found).map_err(|e| failure_of("choice", &e))?;
     let steps = chosen
         .search_result
         .plan
@@ -74,9 +74,8 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
             ..StressParams::default()
         };
         stress.plan.seed = seed;
-        let compared =
-            compare(&ctx, &stress, &surface, &plan).map_err(|e| crate::metrics::failed("stress test", &e))?;
-        rows.extend(said(seed, &compared));
+        let compared = compare(&ctx, &stress, &surface, &plan).map_err(|e| failure_of("stress test", &e))?;
+        rows.extend(rows_of(seed, &compared));
     }
     let head = [
         "draw",
@@ -92,7 +91,7 @@ pub fn run(options: &WorseOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> 
 }
 
 /// Rows of one draw. The kit and half connectors are the same in all draws and listed for the first only.
-fn said(draw: u64, compared: &Comparison) -> Vec<Vec<String>> {
+fn rows_of(draw: u64, compared: &Comparison) -> Vec<Vec<String>> {
     let designs = compared.designs().into_iter();
     let told = designs.filter(|(name, _)| draw == 0 || *name == "half score");
     told.map(|(name, pair)| {

@@ -88,7 +88,7 @@ fn halve_long_edges(mut solid: Solid) -> (Solid, Vec<u32>) {
 mod tests {
     use super::*;
     use shellock_formats::{read_mesh, write_stl_binary};
-    use shellock_testkit::shapes::{as_written, cuboid, torus};
+    use shellock_testkit::shapes::{cuboid, rounded_mesh, torus};
 
     fn load(bytes: &[u8], extension: &str) -> Loaded {
         read_mesh(bytes, Some(extension)).expect("it is a mesh")
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn a_box_of_twelve_triangles_can_be_painted_afterwards_and_is_the_same_box() {
         let stl = load(
-            &write_stl_binary(&as_written(&cuboid([0.0; 3], [60.0, 40.0, 30.0]))),
+            &write_stl_binary(&rounded_mesh(&cuboid([0.0; 3], [60.0, 40.0, 30.0]))),
             "stl",
         );
         let (name, bytes) = finer("box.stl", &stl).expect("its triangles are large");

@@ -106,7 +106,7 @@ impl PinnedLid {
 }
 
 /// A volume's mesh with coordinates rounded to 32 bits, as a file stores it.
-pub fn as_written(volume: &Volume) -> TriMesh {
+pub fn rounded_mesh(volume: &Volume) -> TriMesh {
     let mut mesh = volume.to_mesh();
     mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
     mesh

@@ -165,7 +165,7 @@ fn module(krate: &str, file: &Path) -> Vec<String> {
 /// ignored.
 struct Names {
     at: Vec<String>,
-    found: BTreeSet<Vec<String>>,
+    paths: BTreeSet<Vec<String>>,
 }
 
 impl Names {
@@ -183,7 +183,7 @@ impl Names {
                 from.push(word.clone());
             }
         }
-        self.found.insert(from);
+        self.paths.insert(from);
     }
 
     fn tree(&mut self, before: &[String], tree: &syn::UseTree) {
@@ -232,10 +232,10 @@ fn names(krate: &str, file: &Path) -> BTreeSet<Vec<String>> {
     let parsed = syn::parse_file(&fs::read_to_string(file).unwrap()).unwrap();
     let mut names = Names {
         at: module(krate, file),
-        found: BTreeSet::new(),
+        paths: BTreeSet::new(),
     };
     names.visit_file(&parsed);
-    names.found
+    names.paths
 }
 
 /// Finds names of later modules in files of earlier ones.
@@ -274,10 +274,10 @@ fn grouped_and_relative_imports_are_seen() {
         "use crate::{plan::{self, Way}, body}; use super::super::report; fn f() { crate::verify::go() }";
     let mut names = Names {
         at: vec!["plan".into(), "contact".into()],
-        found: BTreeSet::new(),
+        paths: BTreeSet::new(),
     };
     names.visit_file(&syn::parse_file(text).unwrap());
-    let found: Vec<String> = names.found.iter().map(|name| name.join("::")).collect();
+    let found: Vec<String> = names.paths.iter().map(|name| name.join("::")).collect();
     assert_eq!(
         found,
         ["body", "plan::Way", "plan::self", "report", "verify::go"].map(String::from)
@@ -308,7 +308,7 @@ fn crates_depend_only_on_lower_floors() {
 }
 
 /// Finds files of `crates` whose text has one of the `forbidden` words.
-fn using(crates: &[&str], forbidden: &[&str]) -> Vec<String> {
+fn find_uses(crates: &[&str], forbidden: &[&str]) -> Vec<String> {
     let mut found = Vec::new();
     for file in crates.iter().flat_map(|krate| sources(krate)) {
         let text = fs::read_to_string(&file).unwrap();
@@ -346,7 +346,7 @@ fn library_crates_touch_no_file_clock_or_stdout() {
         "eprintln!",
         "std::env",
     ];
-    let found = using(&crates, &forbidden);
+    let found = find_uses(&crates, &forbidden);
     assert!(found.is_empty(), "{found:#?}");
 }
 
@@ -364,6 +364,6 @@ fn a_job_reads_no_arguments_prints_nothing_and_does_not_end_the_process() {
         "ExitCode",
         "clap",
     ];
-    let found = using(&["job"], &forbidden);
+    let found = find_uses(&["job"], &forbidden);
     assert!(found.is_empty(), "{found:#?}");
 }

@@ -696,14 +696,14 @@ impl Solid {
 
 /// Results printed by CalculiX: displacements and forces by node.
 struct Results {
-    moved: BTreeMap<usize, Vec3>,
+    displacement: BTreeMap<usize, Vec3>,
     force: BTreeMap<usize, Vec3>,
 }
 
 impl Results {
     fn read(text: &str) -> Any<Self> {
         let mut results = Self {
-            moved: BTreeMap::new(),
+            displacement: BTreeMap::new(),
             force: BTreeMap::new(),
         };
         let mut is_force = false;
@@ -719,7 +719,7 @@ impl Results {
             if is_force {
                 &mut results.force
             } else {
-                &mut results.moved
+                &mut results.displacement
             }
             .insert(node.parse::<usize>()? - 1, value);
         }
@@ -727,7 +727,7 @@ impl Results {
     }
 
     fn displacement(&self, node: usize) -> Any<Vec3> {
-        self.moved
+        self.displacement
             .get(&node)
             .copied()
             .ok_or_else(|| format!("no displacement of node {node}").into())

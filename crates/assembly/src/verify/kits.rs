@@ -2,7 +2,7 @@
 
 use shellock_geom::{Solid, TriMesh, Vec3, Volume};
 pub use shellock_testkit::shapes::{ALL, brick};
-use shellock_testkit::shapes::{PinnedLid, as_written, room};
+use shellock_testkit::shapes::{PinnedLid, room, rounded_mesh};
 
 use super::contact::Contact;
 use super::{Assembly, Verification, VerifyParams, examine};
@@ -35,7 +35,7 @@ impl Kit {
             .collect();
         Self {
             model: Solid::new(model.to_mesh()).unwrap(),
-            pieces: pieces.iter().map(as_written).collect(),
+            pieces: pieces.iter().map(rounded_mesh).collect(),
             plan: InstallationPlan { steps },
         }
     }

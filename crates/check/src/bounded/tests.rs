@@ -1,7 +1,7 @@
 //! Cubes in hollows with 0.1 mm of room all round: the bounds on each of their motions, derived by hand.
 
 use super::*;
-use crate::bearing::located;
+use crate::bearing::locate_all;
 use crate::mesh::tests::{cuboid, hollow};
 use crate::quantity::tests::cube;
 
@@ -36,13 +36,13 @@ fn of_cube(a: usize, b: usize, half_mm: f64) -> Vec<Bearing> {
 }
 
 /// Rows from `first` on that bound a displacement of the cube along an axis: all those of that face.
-fn shifted(first: usize, axis: usize, side: usize) -> Vec<(usize, f64)> {
+fn shift_rows(first: usize, axis: usize, side: usize) -> Vec<(usize, f64)> {
     (0..4).map(|i| (first + 8 * axis + 4 * side + i, 0.25)).collect()
 }
 
 /// Rows that bound a rotation about an axis: on two opposite faces, the two points that rise, by the second
 /// axis after the face's or by the first.
-fn turned(first: usize, axis: usize, side: usize, half_mm: f64, by_second: bool) -> Vec<(usize, f64)> {
+fn turn_rows(first: usize, axis: usize, side: usize, half_mm: f64, by_second: bool) -> Vec<(usize, f64)> {
     let face = (axis + if by_second { 2 } else { 1 }) % 3;
     let rises = |i: &usize| {
         let signs = [i / 4 % 2, i / 2 % 2, i % 2].map(sign);
@@ -77,8 +77,8 @@ impl Caged {
             ],
             rows: (0..N).map(|i| [i, 1, 0]).collect(),
             multipliers: vec![
-                both(|k, s| turned(0, k, s, 5.0, false)),
-                both(|k, s| shifted(0, k, s)),
+                both(|k, s| turn_rows(0, k, s, 5.0, false)),
+                both(|k, s| shift_rows(0, k, s)),
             ],
         };
         let meshes = vec![hollow(8.0, 5.1), cuboid([-5.0; 3], [5.0; 3])];
@@ -108,13 +108,13 @@ impl Caged {
         claim.quantities[0] = cube(Some(1), None, None, 0.025);
         claim.quantities[1].most[2][1] = 0.42;
         claim.rows.truncate(20);
-        claim.multipliers[0][1] = [0, 1].map(|side| turned(0, 1, side, 5.0, true));
+        claim.multipliers[0][1] = [0, 1].map(|side| turn_rows(0, 1, side, 5.0, true));
         claim.multipliers[1][2][1] = vec![(20, 1.0)];
         caged
     }
 
     fn test(&self) -> Result<Play, String> {
-        let bearings = located(&self.meshes, &self.bearings)?;
+        let bearings = locate_all(&self.meshes, &self.bearings)?;
         let way_out = Some([0.0, 0.0, 1.0]);
         let kit = Kit {
             meshes: &self.meshes,
@@ -126,8 +126,8 @@ impl Caged {
         test(&kit, &self.claim)
     }
 
-    /// Error message after `change` has been applied.
-    fn refused(mut self, change: impl FnOnce(&mut Self)) -> String {
+    /// Applies `change` and returns the message of the refusal.
+    fn expect_refusal(mut self, change: impl FnOnce(&mut Self)) -> String {
         assert!(self.test().is_ok());
         change(&mut self);
         self.test().expect_err("refused")
@@ -144,9 +144,9 @@ fn a_cube_in_a_hollow_goes_little_farther_than_its_gap() {
 
 #[test]
 fn a_bound_that_is_too_small_is_refused_also_where_another_needs_it() {
-    let small = Caged::new().refused(|c| c.claim.quantities[1].most[2][0] = 0.105);
+    let small = Caged::new().expect_refusal(|c| c.claim.quantities[1].most[2][0] = 0.105);
     assert!(small.starts_with("quantity 1 goes to 0.1"), "{small}");
-    let large = Caged::new().refused(|c| c.claim.quantities[0].most = vec![[0.2; 2]; 3]);
+    let large = Caged::new().expect_refusal(|c| c.claim.quantities[0].most = vec![[0.2; 2]; 3]);
     assert!(
         large.starts_with("quantity"),
         "turned so far, errors are too great: {large}"
@@ -155,14 +155,14 @@ fn a_bound_that_is_too_small_is_refused_also_where_another_needs_it() {
 
 #[test]
 fn a_wider_hollow_is_refused() {
-    let wide = Caged::new().refused(|c| c.meshes[0] = hollow(8.0, 5.15));
+    let wide = Caged::new().expect_refusal(|c| c.meshes[0] = hollow(8.0, 5.15));
     assert!(wide.starts_with("quantity"), "{wide}");
-    let wider = Caged::new().refused(|c| c.meshes[0] = hollow(8.0, 6.5));
+    let wider = Caged::new().expect_refusal(|c| c.meshes[0] = hollow(8.0, 6.5));
     assert!(wider.ends_with("nothing is above"), "{wider}");
 }
 
 /// Hollow with a square pit of 2 mm in its wall along x, between the same two coordinates along y and z.
-fn pitted([from, to]: [f64; 2]) -> Mesh {
+fn hollow_with_pit([from, to]: [f64; 2]) -> Mesh {
     let square = |x: f64, [from, to]: [f64; 2]| [[x, from, from], [x, to, from], [x, to, to], [x, from, to]];
     let rings = [
         square(5.1, [-5.1, 5.1]),
@@ -187,44 +187,44 @@ fn pitted([from, to]: [f64; 2]) -> Mesh {
 #[test]
 fn a_pit_in_the_hollow_is_refused_where_a_point_reaches_it() {
     let mut caged = Caged::new();
-    caged.meshes[0] = pitted([1.0, 2.0]);
+    caged.meshes[0] = hollow_with_pit([1.0, 2.0]);
     assert!(caged.test().is_ok(), "far from all points");
-    let reached = Caged::new().refused(|c| c.meshes[0] = pitted([3.8, 4.7]));
+    let reached = Caged::new().expect_refusal(|c| c.meshes[0] = hollow_with_pit([3.8, 4.7]));
     assert!(reached.starts_with("row 7: a surface goes on to 2"), "{reached}");
 }
 
 #[test]
 fn multipliers_that_are_negative_missing_or_no_numbers_are_refused() {
-    let negative = Caged::new().refused(|c| c.claim.multipliers[1][0][1][2].1 = -0.25);
+    let negative = Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1][2].1 = -0.25);
     assert!(negative.contains("is -0.25"), "{negative}");
-    Caged::new().refused(|c| c.claim.multipliers[1][0][1][2].1 = f64::NAN);
-    Caged::new().refused(|c| c.claim.multipliers[1][0][1][2].1 = 0.3);
-    Caged::new().refused(|c| c.claim.multipliers[1][0][1].clear());
-    Caged::new().refused(|c| c.claim.multipliers[1][0][1][2].0 = N);
-    Caged::new().refused(|c| c.claim.multipliers[1][0][1][2].0 = N + 1);
-    Caged::new().refused(|c| c.claim.multipliers[1].truncate(2));
-    Caged::new().refused(|c| c.claim.multipliers.truncate(1));
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1][2].1 = f64::NAN);
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1][2].1 = 0.3);
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1].clear());
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1][2].0 = N);
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1][0][1][2].0 = N + 1);
+    Caged::new().expect_refusal(|c| c.claim.multipliers[1].truncate(2));
+    Caged::new().expect_refusal(|c| c.claim.multipliers.truncate(1));
 }
 
 #[test]
 fn quantities_of_other_pieces_or_kinds_are_refused() {
-    Caged::new().refused(|c| c.claim.rows[3] = [3, 0, 0]);
-    Caged::new().refused(|c| c.claim.rows[3] = [3, 1, 1]);
-    Caged::new().refused(|c| c.claim.rows[3] = [3, 1, 7]);
-    Caged::new().refused(|c| c.claim.rows[3] = [77, 1, 0]);
-    Caged::new().refused(|c| c.claim.quantities[1].plus = Some(0));
-    Caged::new().refused(|c| c.claim.of_piece[0] = [1, 0]);
-    Caged::new().refused(|c| c.claim.free = vec![0]);
-    Caged::new().refused(|c| c.claim.free = vec![1, 1]);
+    Caged::new().expect_refusal(|c| c.claim.rows[3] = [3, 0, 0]);
+    Caged::new().expect_refusal(|c| c.claim.rows[3] = [3, 1, 1]);
+    Caged::new().expect_refusal(|c| c.claim.rows[3] = [3, 1, 7]);
+    Caged::new().expect_refusal(|c| c.claim.rows[3] = [77, 1, 0]);
+    Caged::new().expect_refusal(|c| c.claim.quantities[1].plus = Some(0));
+    Caged::new().expect_refusal(|c| c.claim.of_piece[0] = [1, 0]);
+    Caged::new().expect_refusal(|c| c.claim.free = vec![0]);
+    Caged::new().expect_refusal(|c| c.claim.free = vec![1, 1]);
 }
 
 #[test]
 fn a_point_off_its_surface_or_a_normal_that_is_none_is_refused() {
-    let off = Caged::new().refused(|c| c.bearings[3].point[0] += 0.001);
+    let off = Caged::new().expect_refusal(|c| c.bearings[3].point[0] += 0.001);
     assert_eq!(off, "bearing 3 is not on piece 2");
-    Caged::new().refused(|c| c.bearings[3].normal[0] *= 1.001);
-    Caged::new().refused(|c| c.bearings[3].normal = [0.6, 0.0, 0.8]);
-    Caged::new().refused(|c| c.bearings[3].b = 1);
+    Caged::new().expect_refusal(|c| c.bearings[3].normal[0] *= 1.001);
+    Caged::new().expect_refusal(|c| c.bearings[3].normal = [0.6, 0.0, 0.8]);
+    Caged::new().expect_refusal(|c| c.bearings[3].b = 1);
 }
 
 #[test]
@@ -232,9 +232,10 @@ fn a_key_is_bounded_while_its_slide_is() {
     let play = Caged::key().test().unwrap();
     assert_eq!(play.slid_mm, Some(0.4));
     assert!((play.shift_mm - (2.0 * 0.12_f64.powi(2) + 0.42_f64.powi(2)).sqrt()).abs() < 1e-9);
-    Caged::key().refused(|c| c.slide = None);
-    let slide =
-        |change: fn(&mut Slide)| Caged::key().refused(|c| c.slide.as_mut().into_iter().for_each(change));
+    Caged::key().expect_refusal(|c| c.slide = None);
+    let slide = |change: fn(&mut Slide)| {
+        Caged::key().expect_refusal(|c| c.slide.as_mut().into_iter().for_each(change))
+    };
     slide(|s| s.most_mm = 0.415);
     slide(|s| s.most_mm = 0.6);
     slide(|s| s.most_mm = -0.1);
@@ -245,7 +246,7 @@ fn a_key_is_bounded_while_its_slide_is() {
 }
 
 /// Cube, piece 2, in a hollow cube of 16 mm, piece 1, in a hollow of piece 0: both are free.
-fn nested() -> Caged {
+fn cube_in_cube() -> Caged {
     let quantities = vec![
         cube(Some(1), None, None, 0.014),
         cube(Some(1), None, Some([0.0; 3]), 0.12),
@@ -257,13 +258,18 @@ fn nested() -> Caged {
     let [outer, inner] = [0, N];
     let sum = |a: Vec<(usize, f64)>, b: Vec<(usize, f64)>| [a, b].concat();
     let multipliers = vec![
-        both(|k, s| turned(outer, k, s, 8.0, false)),
-        both(|k, s| shifted(outer, k, s)),
-        both(|k, s| sum(turned(outer, k, s, 8.0, false), turned(inner, k, s, 5.0, true))),
-        both(|k, s| sum(shifted(outer, k, s), shifted(inner, k, s))),
+        both(|k, s| turn_rows(outer, k, s, 8.0, false)),
+        both(|k, s| shift_rows(outer, k, s)),
+        both(|k, s| {
+            sum(
+                turn_rows(outer, k, s, 8.0, false),
+                turn_rows(inner, k, s, 5.0, true),
+            )
+        }),
+        both(|k, s| sum(shift_rows(outer, k, s), shift_rows(inner, k, s))),
         // The hollow against the cube in it: the opposite direction.
-        both(|k, s| turned(inner, k, 1 - s, 5.0, false)),
-        both(|k, s| shifted(inner, k, 1 - s)),
+        both(|k, s| turn_rows(inner, k, 1 - s, 5.0, false)),
+        both(|k, s| shift_rows(inner, k, 1 - s)),
     ];
     let rows = (0..2 * N)
         .map(|i| if i < N { [i, 1, 0] } else { [i, 5, 4] })
@@ -284,27 +290,28 @@ fn nested() -> Caged {
 
 #[test]
 fn pieces_in_each_other_are_bounded_together() {
-    let play = nested().test().unwrap();
+    let play = cube_in_cube().test().unwrap();
     assert!((play.shift_mm - 0.27 * 3.0_f64.sqrt()).abs() < 1e-9);
     assert!((play.turn_deg - (0.045 * 3.0_f64.sqrt()).to_degrees()).abs() < 1e-9);
 }
 
 #[test]
 fn a_region_of_another_pair_is_refused_also_where_it_is_of_one_of_its_pieces() {
-    let other = nested().refused(|c| c.claim.rows[N + 3] = [N + 3, 3, 4]);
+    let other = cube_in_cube().expect_refusal(|c| c.claim.rows[N + 3] = [N + 3, 3, 4]);
     assert!(other.ends_with("not of pieces 2 and 1"), "{other}");
-    nested().refused(|c| c.claim.rows[N + 3] = [N + 3, 5, 2]);
-    nested().refused(|c| c.claim.rows[3] = [3, 5, 4]);
-    nested().refused(|c| c.claim.quantities[5].minus = None);
-    nested().refused(|c| (c.claim.quantities[5].plus, c.claim.quantities[5].minus) = (Some(2), Some(1)));
-    nested().refused(|c| c.claim.of_piece = vec![[0, 1]]);
+    cube_in_cube().expect_refusal(|c| c.claim.rows[N + 3] = [N + 3, 5, 2]);
+    cube_in_cube().expect_refusal(|c| c.claim.rows[3] = [3, 5, 4]);
+    cube_in_cube().expect_refusal(|c| c.claim.quantities[5].minus = None);
+    cube_in_cube()
+        .expect_refusal(|c| (c.claim.quantities[5].plus, c.claim.quantities[5].minus) = (Some(2), Some(1)));
+    cube_in_cube().expect_refusal(|c| c.claim.of_piece = vec![[0, 1]]);
 }
 
 /// At random poses within the bounds, the cube's points deviate from the linear prediction by no more than
 /// the errors of the rows.
 #[test]
 fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
-    let Caged { claim, bearings, .. } = nested();
+    let Caged { claim, bearings, .. } = cube_in_cube();
     let noise = |i: usize| (0.37 + 7.77 * i as f64).sin();
     for i in 0..2000 {
         let part = |k: usize, most: f64| -> Vec3 {
@@ -312,7 +319,7 @@ fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
         };
         let [a, b] = [[part(0, 0.028), part(1, 0.13)], [part(2, 0.014), part(3, 0.12)]];
         let p = bearings[N + i % N].point;
-        let seen = back(b, moved(a, p));
+        let seen = back(b, move_point(a, p));
         let field = |[w, v]: [Vec3; 2]| -> Vec3 { std::array::from_fn(|k| v[k] + cross(w, p)[k]) };
         let delta = sub(field(a), field(b));
         let of = |q: usize| claim.quantities[q].norm();
@@ -322,8 +329,8 @@ fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
     }
 }
 
-/// Place to which a pose moves `p`, by small steps along its velocity field.
-fn moved([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
+/// Moves `p` as a pose does, by small steps along its velocity field.
+fn move_point([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
     const STEPS: usize = 64;
     let at = |p: Vec3| -> Vec3 { std::array::from_fn(|k| (v[k] + cross(w, p)[k]) / STEPS as f64) };
     (0..STEPS).fold(p, |p, _| {
@@ -334,11 +341,11 @@ fn moved([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
 
 /// Place that a pose moves to `p`.
 fn back([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
-    moved([w.map(|x| -x), v.map(|x| -x)], p)
+    move_point([w.map(|x| -x), v.map(|x| -x)], p)
 }
 
 /// Splits each triangle into `n²` parts of the same surface.
-fn divided(mesh: &Mesh, n: usize) -> Mesh {
+fn divide(mesh: &Mesh, n: usize) -> Mesh {
     let mut triangles = Vec::new();
     for &[a, b, c] in &mesh.triangles {
         // Computed from the corners' weights, so that neighbours have the same points except for rounding,
@@ -367,8 +374,8 @@ fn divided(mesh: &Mesh, n: usize) -> Mesh {
 fn many_small_triangles_bound_as_few_large_ones_do() {
     let mut caged = Caged::new();
     // Rounding moves walls by a millionth.
-    caged.meshes = caged.meshes.iter().map(|mesh| divided(mesh, 18)).collect();
+    caged.meshes = caged.meshes.iter().map(|mesh| divide(mesh, 18)).collect();
     assert!(caged.meshes.iter().all(|mesh| mesh.triangles.len() > 3000));
-    caged.bearings = located(&caged.meshes, &caged.bearings).unwrap();
+    caged.bearings = locate_all(&caged.meshes, &caged.bearings).unwrap();
     assert!(caged.test().is_ok());
 }

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use shellock_geom::{TriMesh, Vec3};
 
-use super::{Case, Claim, body, scaled};
+use super::{Case, Claim, body, scale};
 use Claim::{Labels, Note, Refused, Size, Warning};
 
 /// Identity matrix in column-major order.
@@ -89,7 +89,7 @@ impl Glb {
 
 /// Body in metres: 60 × 40 × 30 mm.
 fn metres() -> TriMesh {
-    scaled(&body(), Vec3::splat(1e-3))
+    scale(&body(), Vec3::splat(1e-3))
 }
 
 fn n_points() -> usize {
@@ -102,7 +102,7 @@ pub fn cases() -> Vec<Case> {
 }
 
 /// Adds a skin with one joint for all points; the joint is node 1.
-fn skinned(glb: &mut Glb, inverse_bind: [f32; 16]) {
+fn add_skin(glb: &mut Glb, inverse_bind: [f32; 16]) {
     let n = n_points();
     let joints = glb.accessor(&vec![0; 4 * n], 5121, "VEC4", n);
     let weights: Vec<f32> = (0..n).flat_map(|_| [1.0, 0.0, 0.0, 0.0]).collect();
@@ -116,14 +116,14 @@ fn skinned(glb: &mut Glb, inverse_bind: [f32; 16]) {
 fn skins() -> Vec<Case> {
     // The joint doubles the size; the node's own scale is ignored.
     let mut posed = Glb::of(&metres());
-    skinned(&mut posed, IDENTITY);
+    add_skin(&mut posed, IDENTITY);
     posed.json["nodes"] = json!([{ "mesh": 0, "skin": 0, "scale": [9, 9, 9] }, { "scale": [2, 2, 2] }]);
     posed.json["scenes"] = json!([{ "nodes": [0, 1] }]);
     // Joint and inverse bind matrix cancel out: a model in centimetres is shown in metres.
-    let mut bound = Glb::of(&scaled(&metres(), Vec3::splat(100.0)));
+    let mut bound = Glb::of(&scale(&metres(), Vec3::splat(100.0)));
     let mut inverse = IDENTITY;
     [0, 5, 10].into_iter().for_each(|k| inverse[k] = 0.01);
-    skinned(&mut bound, inverse);
+    add_skin(&mut bound, inverse);
     bound.json["nodes"] = json!([{ "mesh": 0, "skin": 0 }, {}]);
     vec![
         Case::new("skin_posed.glb", posed.bytes())
@@ -240,7 +240,7 @@ fn sizes() -> Vec<Case> {
     let longest = |name: &'static str, longest: f64| {
         Case::new(
             name,
-            Glb::of(&scaled(&body(), Vec3::splat(longest / 60.0))).bytes(),
+            Glb::of(&scale(&body(), Vec3::splat(longest / 60.0))).bytes(),
         )
     };
     let guess = [Size([150.0, 100.0, 75.0]), Warning("the model is made 150 mm")];

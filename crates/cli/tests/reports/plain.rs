@@ -6,7 +6,7 @@ use shellock_formats::{write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3, Volume};
 use shellock_testkit::shapes;
 
-use super::{Case, Claim, body, moved, scaled};
+use super::{Case, Claim, body, scale, shift};
 use Claim::{Labels, Note, Refused, Size, Warning};
 
 const WHOLE: Claim = Size([60.0, 40.0, 30.0]);
@@ -123,7 +123,7 @@ fn left_and_right() -> String {
             .map(|v| v.parse::<usize>().expect("a number") + n);
         corners.map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
     };
-    let right = obj(&moved(&body(), Vec3::X * 90.0), |_| String::new());
+    let right = obj(&shift(&body(), Vec3::X * 90.0), |_| String::new());
     let right: String = right
         .lines()
         .map(|line| match line.strip_prefix("f ") {
@@ -183,7 +183,7 @@ fn of_obj() -> Vec<Case> {
 
 fn of_stl() -> Vec<Case> {
     let binary = write_stl_binary(&body());
-    let beside = write_stl_binary(&moved(&body(), Vec3::X * 90.0));
+    let beside = write_stl_binary(&shift(&body(), Vec3::X * 90.0));
     let text = b"solid x\n facet normal 0 0 0\n".repeat(3);
     vec![
         Case::new("one_after_the_other.stl", [binary.clone(), beside].concat())
@@ -225,7 +225,7 @@ fn stl(volume: &Volume) -> Vec<u8> {
 }
 
 /// Body with walls of 2.4 mm and round holes of 4 mm, bored along z from the given places outwards.
-fn drained(holes: &[[f64; 3]]) -> Volume {
+fn body_with_drains(holes: &[[f64; 3]]) -> Volume {
     let volume = |mesh: &TriMesh| Volume::from_closed_mesh(mesh).expect("it is closed");
     let outer = volume(&smooth(Vec3::new(30.0, 20.0, 15.0)));
     let inner = volume(&smooth(Vec3::new(27.6, 17.6, 12.6)));
@@ -244,7 +244,7 @@ fn drained(holes: &[[f64; 3]]) -> Volume {
 
 /// Ellipsoid of 2048 triangles with these half axes.
 fn smooth(half_axes: Vec3) -> TriMesh {
-    scaled(&shapes::ball(4, Vec3::ZERO, 1.0), half_axes)
+    scale(&shapes::ball(4, Vec3::ZERO, 1.0), half_axes)
 }
 
 /// Box with a slit of this width, mm, across it.
@@ -268,7 +268,7 @@ fn with_wall(wall_mm: f64) -> TriMesh {
 /// The body, with a smaller body that is inside out and sticks out of it.
 fn inside_out() -> Vec<u8> {
     let mut mesh = body();
-    let mut tool = scaled(&moved(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0));
+    let mut tool = scale(&shift(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0));
     tool.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let n = mesh.points.len() as u32;
     mesh.points.extend(tool.points);
@@ -282,11 +282,11 @@ fn decisions() -> Vec<Case> {
     let one = [[0.0, 0.0, -15.0]];
     let two = [[0.0, 0.0, -15.0], [10.0, 0.0, 15.0]];
     vec![
-        Case::new("drained.stl", stl(&drained(&one)))
+        Case::new("drained.stl", stl(&body_with_drains(&one)))
             .says(&[Refused("already hollow: its wall is 2.4 mm thick")])
             .proves("all", "refused", "models that are hollow already"),
-        Case::new("drained_twice.stl", stl(&drained(&two))).says(&[Refused("2 openings near")]),
-        Case::new("drained_filled.stl", stl(&drained(&two)))
+        Case::new("drained_twice.stl", stl(&body_with_drains(&two))).says(&[Refused("2 openings near")]),
+        Case::new("drained_filled.stl", stl(&body_with_drains(&two)))
             .with(&["--fill"])
             .says(&[WHOLE, Note("2 openings were closed")])
             .proves("all", "read", "models that are hollow already, with `--fill`"),

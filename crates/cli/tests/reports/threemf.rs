@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 
 use shellock_geom::{TriMesh, Vec3};
 
-use super::{Case, Claim, body, moved, scaled};
+use super::{Case, Claim, body, scale, shift};
 use Claim::{Labels, Note, Refused, Size, Warning};
 
 const PRUSA: &str = "Metadata/Slic3r_PE_model.config";
@@ -66,7 +66,7 @@ fn with(name: &str, settings: &str, resources: &str, build: &str) -> Vec<u8> {
 fn two() -> [TriMesh; 2] {
     [
         body(),
-        scaled(&moved(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0)),
+        scale(&shift(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0)),
     ]
 }
 
@@ -89,12 +89,12 @@ pub fn cases() -> Vec<Case> {
         marks(),
         types(),
         extensions(),
-        shared(),
+        common_parts(),
         packages(),
         plates(),
         attributes(),
         sizes(),
-        told(),
+        pitfalls(),
     ]
     .concat()
 }
@@ -145,7 +145,7 @@ fn negative() -> Vec<Case> {
 }
 
 /// Cases in which a wrong part, size or role could be taken silently.
-fn told() -> Vec<Case> {
+fn pitfalls() -> Vec<Case> {
     let [a, b] = two();
     let part = object(1, "", &mesh(&a, ""));
     let vendor = "unit=\"millimeter\" x:unit=\"inch\" xmlns:x=\"urn:vendor\"";
@@ -168,7 +168,7 @@ fn told() -> Vec<Case> {
         "",
         "<components><component p:path=\"/3D/o.model\" objectid=\"1\"/></components>",
     );
-    let small = object(1, "", &mesh(&scaled(&a, Vec3::splat(0.1)), ""));
+    let small = object(1, "", &mesh(&scale(&a, Vec3::splat(0.1)), ""));
     let off = plain(&part, "<item objectid=\"1\" printable=\"0\"/>");
     vec![
         Case::new("vendor.3mf", package(&[(ROOT, &model(vendor, &added, build))]))
@@ -313,7 +313,8 @@ fn extensions() -> Vec<Case> {
     ]
 }
 
-fn shared() -> Vec<Case> {
+/// Cases of objects that have parts in common.
+fn common_parts() -> Vec<Case> {
     let [a, b] = two();
     let component = |id: u32| format!("<component p:path=\"/3D/o.model\" objectid=\"{id}\"/>");
     let pair = format!("<components>{}{}</components>", component(1), component(2));
@@ -537,10 +538,10 @@ fn attributes() -> Vec<Case> {
 
 fn sizes() -> Vec<Case> {
     let of = |attributes: &str, factor: f64| {
-        let resources = object(1, "", &mesh(&scaled(&body(), Vec3::splat(factor)), ""));
+        let resources = object(1, "", &mesh(&scale(&body(), Vec3::splat(factor)), ""));
         package(&[(ROOT, &model(attributes, &resources, ITEM))])
     };
-    let far = both([body(), moved(&body(), Vec3::X * 3000.0)]);
+    let far = both([body(), shift(&body(), Vec3::X * 3000.0)]);
     let modifier = "<config><object id=\"1\"><volume firstid=\"512\" lastid=\"9999\"><metadata \
                     type=\"volume\" key=\"volume_type\" \
                     value=\"ParameterModifier\"/></volume></object></config>";

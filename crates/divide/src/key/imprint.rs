@@ -59,7 +59,7 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
 
 /// Returns the surface with the part in `prism` as a patch, and the id of that patch, as [`imprint`] does. If
 /// the key leaves a piece hanging on another, the pieces are refined first.
-pub fn imprint_refined(
+pub fn imprint_and_refine(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,

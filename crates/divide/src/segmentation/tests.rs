@@ -53,7 +53,7 @@ fn arm_labels(solid: &Solid) -> Vec<i64> {
         .collect()
 }
 
-fn assert_patches_are_connected(surface: &SegmentedSurface) {
+fn assert_connected_patches(surface: &SegmentedSurface) {
     let topology = Topology::of_mesh(&surface.mesh).unwrap();
     let patch = &surface.patch_of_face;
     let (_, n) = components(&topology, |f, g| patch[f as usize] == patch[g as usize]);
@@ -69,7 +69,7 @@ fn automatic_patches_cover_the_closed_surface_and_hold_each_other_twice() {
     assert!((cut.volume() / solid.volume() - 1.0).abs() < 1e-12);
     let area: f64 = surface.areas().as_slice().iter().sum();
     assert!((area / solid.mesh().area() - 1.0).abs() < 1e-12);
-    assert_patches_are_connected(&surface);
+    assert_connected_patches(&surface);
     assert!(surface.contact_graph(params.min_contact_mm).is_two_connected());
     for (face, &source) in surface.source_face.iter().enumerate() {
         let normal = solid.mesh().face_normal(source as usize);
@@ -102,7 +102,7 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
             .iter()
             .any(|w| w.code() == "piece-split" && w.at.is_some())
     );
-    assert_patches_are_connected(&surface);
+    assert_connected_patches(&surface);
 }
 
 /// Segments the arms' labels. A seam half round an arm lies between the two limits on contacts.
@@ -134,7 +134,7 @@ fn arms_too_thin_for_two_contacts_join_their_neighbour_and_the_user_is_told_wher
             .iter()
             .any(|w| w.code() == "piece-joined" && w.at.is_some())
     );
-    assert_patches_are_connected(&surface);
+    assert_connected_patches(&surface);
 }
 
 #[test]

@@ -299,8 +299,8 @@ fn whole(source: &mut impl Source, scalar: Scalar) -> Result<i64, ReadError> {
     let value = source.next(scalar)?;
     whole_of(value).ok_or_else(|| ReadError::Malformed {
         at,
-        expected: "a whole number",
-        found: value.to_string(),
+        syntax: "a whole number",
+        text: value.to_string(),
     })
 }
 

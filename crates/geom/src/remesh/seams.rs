@@ -7,7 +7,7 @@ use crate::{HalfEdge, Topology, Vec3};
 /// line is the distance from its start along it, mm.
 pub(super) struct Seam {
     /// Label to the left of the line's direction, seen from outside: the lower of the two.
-    pub left: u32,
+    pub left_label: u32,
     /// True if no corner lies on the line.
     pub is_closed: bool,
     points: Vec<Vec3>,
@@ -83,7 +83,7 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
     let left = surface.label_of(first);
     let is_closed = surface.place[begin as usize] != Place::Corner;
     let mut seam = Seam {
-        left,
+        left_label: left,
         is_closed,
         points: vec![surface.points[begin as usize]],
         at_mm: vec![0.0],
@@ -118,7 +118,7 @@ impl Surface {
     /// Places of the ends of a seam's half-edge in the seam's direction, start first; `end > start`.
     pub fn span(&self, h: HalfEdge, seams: &[Seam]) -> [f64; 2] {
         let seam = &seams[self.seam[h as usize] as usize];
-        let h = if self.label_of(h) == seam.left {
+        let h = if self.label_of(h) == seam.left_label {
             h
         } else {
             self.opposite[h as usize]
@@ -141,7 +141,7 @@ impl Surface {
     pub fn relaxed_along(&self, v: u32, share: f64, seams: &[Seam]) -> Option<(u32, f64)> {
         let onwards = self.around(v).find(|&h| {
             let seam = self.seam[h as usize];
-            seam != NO_SEAM && self.label_of(h) == seams[seam as usize].left
+            seam != NO_SEAM && self.label_of(h) == seams[seam as usize].left_label
         })?;
         let back = self
             .around(v)

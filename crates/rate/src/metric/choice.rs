@@ -272,7 +272,7 @@ fn hold(
 /// Warns of pieces that come apart, of pieces that are loose, and of a use that the plan does not withstand.
 fn warn(ctx: &Ctx<'_>, model: &PlanModel, holding: &Holding, chosen: &RankedPlan) {
     if !holding.loose.is_empty() {
-        warn_of_parting(ctx, &holding.loose);
+        warn_of_loose_pieces(ctx, &holding.loose);
     }
     chosen
         .loose
@@ -358,7 +358,7 @@ pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> 
     bench.cases.iter().zip(&rated.load_factors()).map(one).collect()
 }
 
-fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
+fn warn_of_loose_pieces(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
     ctx.warn(Warning::new(
         Cause::ComesApart,
         loose.iter().map(|part| part.piece).collect(),

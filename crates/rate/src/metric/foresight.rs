@@ -61,7 +61,7 @@ impl Foresight {
 
     /// Pieces but the key that surely rattle even in the plan whose loosest piece has the least play, the
     /// loosest first.
-    pub fn rattling(&self) -> Vec<PatchId> {
+    pub fn rattlers(&self) -> Vec<PatchId> {
         let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| loosest_first(plan.plan.key(), excess))
     }

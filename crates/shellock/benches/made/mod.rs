@@ -18,14 +18,14 @@ pub struct Made {
     pub sizes: ConnectorSizes,
     pub surface: SegmentedSurface,
     /// Plan as the search found it.
-    pub found: LatticePlan,
+    pub lattice_plan: LatticePlan,
     /// Plan in the form that the verification takes.
     pub plan: InstallationPlan,
     pub grid: ShellGrid,
     pub distances: PatchDistances,
     pub shell: ShellBodies,
     pub runs: Vec<Run>,
-    pub finished: Finished,
+    pub pieces: Finished,
 }
 
 impl Made {
@@ -47,19 +47,19 @@ impl Made {
         let distances = PatchDistances::measure(&grid, &surface);
         let shell = split(&settings, &surface, &sizes, &grid, &distances, &plan);
         let runs = runs(&settings, &sizes, &grid, &shell, &plan);
-        let finished = finish(&settings, &surface, &sizes, &grid, &shell, &plan, &runs);
+        let pieces = finish(&settings, &surface, &sizes, &grid, &shell, &plan, &runs);
         let judged = InstallationPlan::new(plan.steps.iter().map(|s| (s.piece, s.separation.into())));
         Self {
             settings,
             sizes,
             surface,
-            found: plan,
+            lattice_plan: plan,
             plan: judged,
             grid,
             distances,
             shell,
             runs,
-            finished,
+            pieces,
         }
     }
 
@@ -67,9 +67,9 @@ impl Made {
     pub fn assembly<'a>(&'a self, model: &'a Solid) -> Assembly<'a> {
         Assembly {
             model: Some(model),
-            pieces: &self.finished.meshes,
+            pieces: &self.pieces.meshes,
             plan: &self.plan,
-            press_fits: &self.finished.press_fits,
+            press_fits: &self.pieces.press_fits,
         }
     }
 }

@@ -320,7 +320,7 @@ pub(super) fn next_plan(
     let foresight = Foresight::of(&choice, &found);
     let mut late = None;
     if allowance.is_wanted(Step::JoinPredicted)
-        && let rattling = foresight.rattling()
+        && let rattling = foresight.rattlers()
         && !rattling.is_empty()
     {
         late = allowance.late(Step::JoinPredicted);

@@ -85,7 +85,7 @@ impl<'a> Candidate<'a> {
             }));
         };
         let Some((surface, patch)) =
-            key::imprint_refined(ctx, &given.segmentation, &surface, &key.site.prism)?
+            key::imprint_and_refine(ctx, &given.segmentation, &surface, &key.site.prism)?
         else {
             return Ok(None);
         };

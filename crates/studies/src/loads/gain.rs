@@ -16,7 +16,7 @@ use shellock_mechanics::{Drift, SurfaceModel};
 
 use super::{LoadsOptions, deed};
 use crate::failure::Failure;
-use crate::metrics::{Subject, failed};
+use crate::metrics::{Subject, failure_of};
 use crate::sheet::Sheet;
 use crate::table::markdown;
 
@@ -32,12 +32,12 @@ pub fn sheets(
 ) -> Result<Vec<Sheet>, Failure> {
     let params = Settings::resolve(&options.subject.model.params()).plan;
     let (constraints, ctx) = (PlanConstraints::default(), Ctx::quiet());
-    let found = found(&ctx, &params, subject, &constraints)?;
+    let found = find_plan(&ctx, &params, subject, &constraints)?;
     let counted = found.apply_counts(&subject.survey);
     let most_cost = found.score.worst * options.slack;
     let around = Neighbourhood::new(&params, &counted, &constraints, &found, most_cost);
-    let bench = Bench::new(handling, &subject.model).map_err(unsolved)?;
-    let first = bench.rate(found.pool[0].clone()).map_err(unsolved)?;
+    let bench = Bench::new(handling, &subject.model).map_err(surface_failure)?;
+    let first = bench.rate(found.pool[0].clone()).map_err(surface_failure)?;
     let start = Instant::now();
     let rules = ClimbRules {
         params: ClimbParams {
@@ -47,7 +47,7 @@ pub fn sheets(
         around: &around,
         may_be: &|_| true,
     };
-    let top = climb(&ctx, rules, &bench, &found.pool).map_err(|e: ClimbError| failed("climb", &e))?;
+    let top = climb(&ctx, rules, &bench, &found.pool).map_err(|e: ClimbError| failure_of("climb", &e))?;
     let pace = pace(&top, start.elapsed().as_secs_f64());
     eprintln!(
         "{pace}; cost {:.3}, least {:.3}",
@@ -55,9 +55,9 @@ pub fn sheets(
     );
 
     let plans = of_one_key(subject, options, &params, found.plan.key());
-    let scale = Scale::new(subject, &bench.cases).map_err(unsolved)?;
-    let drawn = scale.drawn(&plans, &around).map_err(unsolved)?;
-    let openings = openings(&scale, &drawn, [&first, &top.best], &pace).map_err(unsolved)?;
+    let scale = Scale::new(subject, &bench.cases).map_err(surface_failure)?;
+    let drawn = scale.rate_all(&plans, &around).map_err(surface_failure)?;
+    let openings = openings(&scale, &drawn, [&first, &top.best], &pace).map_err(surface_failure)?;
     Ok(vec![
         ("climb.md".to_owned(), load_by_load(&bench, &first, &top.best)),
         ("openings.md".to_owned(), openings),
@@ -79,11 +79,11 @@ fn of_one_key(
     random_plans(&params, &subject.survey, n)
 }
 
-fn unsolved(e: SparseError) -> Failure {
-    failed("surface", &e)
+fn surface_failure(e: SparseError) -> Failure {
+    failure_of("surface", &e)
 }
 
-fn found(
+fn find_plan(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     subject: &Subject,
@@ -91,8 +91,8 @@ fn found(
 ) -> Result<Box<FoundPlan>, Failure> {
     match search(ctx, params, &subject.survey, constraints) {
         Ok(PlanOutcome::Found(found)) => Ok(found),
-        Ok(_) => Err(failed("search", &"no plan keeps all conditions")),
-        Err(e) => Err(failed("search", &e)),
+        Ok(_) => Err(failure_of("search", &"no plan keeps all conditions")),
+        Err(e) => Err(failure_of("search", &e)),
     }
 }
 
@@ -134,7 +134,7 @@ struct Drawn {
     /// Openings of the plans that the climb may choose, mm, in increasing order.
     allowed_mm: Vec<f64>,
     /// Largest of the plans' least load factors of uses.
-    most_borne: f64,
+    most_factor: f64,
     /// Number of openings computed per second.
     openings_a_second: f64,
 }
@@ -174,7 +174,7 @@ impl<'a> Scale<'a> {
         Ok(Some(least))
     }
 
-    fn drawn(&self, plans: &[LatticePlan], around: &Neighbourhood<'_>) -> Result<Drawn, SparseError> {
+    fn rate_all(&self, plans: &[LatticePlan], around: &Neighbourhood<'_>) -> Result<Drawn, SparseError> {
         let start = Instant::now();
         let mut openings_mm: Vec<f64> = (plans.par_iter())
             .map(|plan| self.opening_mm(plan))
@@ -186,17 +186,17 @@ impl<'a> Scale<'a> {
         let mut allowed_mm: Vec<f64> = pairs.filter(|(_, a)| *a).map(|(mm, _)| *mm).collect();
         openings_mm.sort_by(f64::total_cmp);
         allowed_mm.sort_by(f64::total_cmp);
-        let mut most_borne = 0.0_f64;
+        let mut most_factor = 0.0_f64;
         for batch in plans.chunks(BATCH) {
             let least: Vec<Option<f64>> = (batch.par_iter())
-                .map(|plan| self.least(plan, most_borne))
+                .map(|plan| self.least(plan, most_factor))
                 .collect::<Result<_, _>>()?;
-            most_borne = least.into_iter().flatten().fold(most_borne, f64::max);
+            most_factor = least.into_iter().flatten().fold(most_factor, f64::max);
         }
         Ok(Drawn {
             openings_mm,
             allowed_mm,
-            most_borne,
+            most_factor,
             openings_a_second,
         })
     }
@@ -219,7 +219,7 @@ fn openings(
         ("random, median", (at(0.5), f64::NAN)),
         ("random, best 1 %", (at(0.01), f64::NAN)),
         (&allowed, (quantile(&drawn.allowed_mm, 0.0), f64::NAN)),
-        ("random, best of each column", (at(0.0), drawn.most_borne)),
+        ("random, best of each column", (at(0.0), drawn.most_factor)),
         ("the search's", rated(first)?),
         ("climbed", rated(best)?),
     ];

@@ -43,13 +43,13 @@ impl Score {
             Ok(solution) if solution.error <= subject.model.params.surface().tolerance => {
                 Self::of(solution.resistance)
             }
-            Ok(solution) => Self::unsolved(&format!("{:.1e} of the force is left", solution.error)),
-            Err(e) => Self::unsolved(&e.to_string()),
+            Ok(solution) => Self::give_up(&format!("{:.1e} of the force is left", solution.error)),
+            Err(e) => Self::give_up(&e.to_string()),
         }
     }
 
     /// Warns why a plan has no score, and returns that score.
-    fn unsolved(why: &str) -> Self {
+    fn give_up(why: &str) -> Self {
         eprintln!("warning: a plan was not solved: {why}");
         Self::Unsolved
     }
@@ -142,11 +142,11 @@ impl Column {
         youngs_modulus_mpa: f64,
         n: usize,
     ) -> Result<Self, Failure> {
-        let volume = || volume_model(subject, youngs_modulus_mpa).map_err(|e| failed(name, &e));
+        let volume = || volume_model(subject, youngs_modulus_mpa).map_err(|e| failure_of(name, &e));
         Self::new(name, n, volume, |volume, i| {
             match volume.resist(&subject.meetings[i], subject.key) {
                 Ok(resistance) => Score::of(resistance),
-                Err(e) => Score::unsolved(&e.to_string()),
+                Err(e) => Score::give_up(&e.to_string()),
             }
         })
     }
@@ -157,7 +157,8 @@ impl Column {
             stiffness_ratios,
             ..subject.model.params.surface()
         };
-        let surface = || SurfaceModel::new(&params, &subject.model.assembly).map_err(|e| failed(name, &e));
+        let surface =
+            || SurfaceModel::new(&params, &subject.model.assembly).map_err(|e| failure_of(name, &e));
         Self::new(name, subject.plans.len(), surface, |surface, i| {
             Score::of_surface(surface.resist(&subject.meetings[i], subject.key), subject)
         })
@@ -165,7 +166,7 @@ impl Column {
 
     /// Evaluates each piece alone, with its neighbours held.
     pub fn by_pieces_alone(name: &str, subject: &Subject) -> Result<Self, Failure> {
-        let surface = || subject.model.surface_model().map_err(|e| failed(name, &e));
+        let surface = || subject.model.surface_model().map_err(|e| failure_of(name, &e));
         Self::new(
             name,
             subject.plans.len(),
@@ -177,14 +178,15 @@ impl Column {
                 PatchId(subject.key),
             ) {
                 Ok(quality_mm) => quality_mm.map_or(Score::Separable, Score::Rated),
-                Err(e) => Score::unsolved(&e.to_string()),
+                Err(e) => Score::give_up(&e.to_string()),
             },
         )
     }
 
     /// Evaluates Eq. 6 as published.
     pub fn by_eq_6(name: &str, subject: &Subject) -> Result<Self, Failure> {
-        let tests = || LocalTests::simulate(&subject.model.params.surface()).map_err(|e| failed(name, &e));
+        let tests =
+            || LocalTests::simulate(&subject.model.params.surface()).map_err(|e| failure_of(name, &e));
         Self::new(name, subject.plans.len(), tests, |tests, i| {
             Score::Rated(data_driven(&subject.model, tests, &subject.meetings[i]))
         })
@@ -220,7 +222,7 @@ fn volume_model(subject: &Subject, youngs_modulus_mpa: f64) -> Result<VolumeMode
 }
 
 /// Creates the failure of a metric that could not be computed.
-pub fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
+pub fn failure_of(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
     Failure::Metric {
         metric: metric.to_owned(),
         problem: problem.to_string(),

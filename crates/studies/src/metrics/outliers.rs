@@ -14,7 +14,7 @@ pub struct Outlier {
     /// Rank among the plans that hold, by each metric; 1 is the worst.
     pub ranks: [f64; 2],
     /// Weakest station of the plan by each metric.
-    pub deciding: Vec<Deciding>,
+    pub stations: Vec<Deciding>,
 }
 
 /// A station that determines a plan's quality.
@@ -47,7 +47,7 @@ pub fn outliers(subject: &Subject, first: &Column, second: &Column) -> Vec<Outli
         Outlier {
             plan: *plan,
             ranks: [ranks[0][i], ranks[1][i]],
-            deciding: deciding.collect(),
+            stations: deciding.collect(),
         }
     };
     let mut outliers: Vec<Outlier> = both.iter().enumerate().map(outlier).collect();

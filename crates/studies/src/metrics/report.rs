@@ -121,7 +121,7 @@ fn worst(outliers: &[Outlier]) -> String {
             o.plan.to_string(),
             format!("{:.0}, {:.0}", o.ranks[0], o.ranks[1]),
         ];
-        row.extend(o.deciding.iter().map(|d| {
+        row.extend(o.stations.iter().map(|d| {
             let [v, s] = d.weighted_mm.map(|w| format!("{w:.2e}"));
             format!(
                 "{} of pieces {}–{}: {v}, {s}",

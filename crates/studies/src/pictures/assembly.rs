@@ -9,7 +9,7 @@ use shellock_render::stills::{Camera, Image, Painted, render};
 
 use super::draw::{DARK, PALE, dots, part, plain, tube};
 use super::kit::Kit;
-use super::sheet::{Sheet, WIDTH, hex, pasted, pixels, small_png};
+use super::sheet::{Sheet, WIDTH, hex, paste, pixels, small_png};
 
 /// Distance of a new piece from its place, mm.
 const TRAVEL_MM: f64 = 30.0;
@@ -22,7 +22,7 @@ fn all(kit: &Kit, share: f64, camera: &Camera, [width, height]: [usize; 2]) -> I
     let shifts = exploded_shifts(&kit.report_pieces());
     let scene: Vec<Painted<'_>> = kit
         .ids()
-        .map(|p| kit.painted(p, share * shifts[usize::from(p)]))
+        .map(|p| kit.paint(p, share * shifts[usize::from(p)]))
         .collect();
     render(&scene, camera, width, height)
 }
@@ -44,7 +44,7 @@ pub fn kit(kit: &Kit) -> Vec<u8> {
         let at = [WHOLE[0] + (i % COLUMNS) * 260, (i / COLUMNS) * 370];
         pictures.push((at, step_picture(kit, &order, step, &room, STEP)));
     }
-    small_png(&pasted([WHOLE[0] + COLUMNS * 260, WHOLE[1]], &pictures), 200)
+    small_png(&paste([WHOLE[0] + COLUMNS * 260, WHOLE[1]], &pictures), 200)
 }
 
 /// Points without triangles that give all step pictures the same frame.
@@ -68,7 +68,7 @@ fn step_picture(kit: &Kit, order: &[PatchId], step: usize, room: &TriMesh, size:
         .enumerate()
         .map(|(i, &p)| {
             let is_new = i == step && step > 0;
-            kit.painted(
+            kit.paint(
                 p,
                 if is_new {
                     TRAVEL_MM * kit.way_out(p)
@@ -99,7 +99,7 @@ pub fn steps(kit: &Kit) -> Vec<u8> {
         let size = [CELL[0], CELL[1] - 12.0].map(pixels);
         sheet.still([at[0], at[1] + 12.0], step_picture(kit, &order, i, &room, size));
         sheet.words([at[0] + 6.0, at[1] + 20.0], &format!("{}.", i + 1));
-        sheet.numbered([at[0] + 40.0, at[1] + 15.0], kit.color(piece), piece.0);
+        sheet.disc([at[0] + 40.0, at[1] + 15.0], kit.color(piece), piece.0);
         if piece == kit.design.kit.plan.key() {
             sheet.words([at[0] + 58.0, at[1] + 20.0], "the key, from below");
         }
@@ -193,7 +193,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
         let mut scene: Vec<Painted<'_>> = spots.iter().map(|(p, m)| plain(m, kit.color(*p))).collect();
         scene.push(Painted {
             color: PALE,
-            ..kit.painted(piece, Vec3::ZERO)
+            ..kit.paint(piece, Vec3::ZERO)
         });
         let outwards = outwards(piece);
         let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
@@ -208,7 +208,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
         let first = left + 0.5 * VIEW[0] - 15.0 * (spots.len() as f64 - 1.0);
         for (k, (other, _)) in spots.iter().enumerate() {
             let at = [first + 30.0 * k as f64, VIEW[1] + 50.0];
-            sheet.numbered(at, kit.color(*other), other.0);
+            sheet.disc(at, kit.color(*other), other.0);
         }
     }
     sheet.bytes()

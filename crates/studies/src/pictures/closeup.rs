@@ -192,11 +192,11 @@ pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
         .filter(|&p| p != key)
         .map(|p| Painted {
             color: PALE,
-            ..kit.painted(p, Vec3::ZERO)
+            ..kit.paint(p, Vec3::ZERO)
         })
         .collect();
     let mut on_its_way = rest.clone();
-    on_its_way.push(kit.painted(key, out));
+    on_its_way.push(kit.paint(key, out));
     on_its_way.extend(edges.iter().map(|edge| plain(edge, RED)));
     let bounds = kit.meshes[usize::from(key)].bounds();
     let moved = Aabb {
@@ -211,7 +211,7 @@ pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let place: Vec<Painted<'_>> = kit
         .ids()
         .filter(|&p| p != key)
-        .map(|p| kit.painted(p, Vec3::ZERO))
+        .map(|p| kit.paint(p, Vec3::ZERO))
         .collect();
     let inside = Camera::along(normal - 0.25 * slide, -slide);
     let stills = [
@@ -229,7 +229,7 @@ pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
             "its place: straight tongues at the sides",
         ),
         (
-            render(&[kit.painted(key, Vec3::ZERO)], &inside, size[0], size[1]),
+            render(&[kit.paint(key, Vec3::ZERO)], &inside, size[0], size[1]),
             "the key from inside: a groove for each",
         ),
     ];

@@ -61,15 +61,15 @@ impl Kit {
         let mut params = params();
         params.method = Method::Auto;
         params.n_pieces = Some(OF_DEMO);
-        Self::made(&params)
+        Self::make(&params)
     }
 
     /// Makes a squirrel with pieces of similar size and joints of all kinds, for close-ups.
     pub fn squirrel() -> Result<Self, Failure> {
-        Self::made(&params())
+        Self::make(&params())
     }
 
-    fn made(params: &Params) -> Result<Self, Failure> {
+    fn make(params: &Params) -> Result<Self, Failure> {
         let fault = |problem: String| Failure::Model {
             path: PathBuf::from("squirrel"),
             problem,
@@ -111,8 +111,8 @@ impl Kit {
         self.design.kit.plan.separation(piece).unit()
     }
 
-    /// Piece in place, moved by `shift`.
-    pub fn painted(&self, piece: PatchId, shift: Vec3) -> Painted<'_> {
+    /// Paints a piece in place, moved by `shift`.
+    pub fn paint(&self, piece: PatchId, shift: Vec3) -> Painted<'_> {
         let i = usize::from(piece);
         Painted {
             mesh: &self.meshes[i],

@@ -133,7 +133,7 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
 }
 
 /// Draws the chart of `shellock test --compare` with its defaults.
-pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
+pub fn comparison(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let made = &kit.design.kit;
     let (mut plan, mut turn) = (kit.settings.plan.clone(), Turn::default());
     if let Some(site) = &kit.design.key {

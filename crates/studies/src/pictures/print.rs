@@ -111,7 +111,7 @@ pub fn booklet(kit: &Kit) -> Vec<u8> {
             &(i + 1).to_string(),
         );
         let left = at[0] + if i + 1 < 10 { 56.0 } else { 76.0 };
-        sheet.numbered([left, at[1] + 28.0], step.piece.0, step.piece.1);
+        sheet.disc([left, at[1] + 28.0], step.piece.0, step.piece.1);
         sheet.words([left + 24.0, at[1] + 24.0], &step.heading);
         let (words, is_new) = step.viewpoint;
         let style = if is_new {

@@ -76,7 +76,7 @@ impl Sheet {
     }
 
     /// Draws a disc in a piece's colour with its number.
-    pub fn numbered(&mut self, middle: [f64; 2], color: [u8; 3], number: u32) {
+    pub fn disc(&mut self, middle: [f64; 2], color: [u8; 3], number: u32) {
         let [x, y] = middle;
         let _ = writeln!(
             self.0,
@@ -99,7 +99,7 @@ pub fn with_small_stills(svg: &str) -> String {
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let (data, rest) = part.split_once('"').unwrap_or((part, ""));
-        let small = decoded(data).map(|still| STANDARD.encode(small_png(&still.on([255; 3]), N_COLORS)));
+        let small = decode_still(data).map(|still| STANDARD.encode(small_png(&still.on([255; 3]), N_COLORS)));
         text += START;
         text += small.as_deref().unwrap_or(data);
         text += "\"";
@@ -109,7 +109,7 @@ pub fn with_small_stills(svg: &str) -> String {
 }
 
 /// Decodes a still of four channels, as the program makes them; `None` for anything else.
-fn decoded(data: &str) -> Option<Image> {
+fn decode_still(data: &str) -> Option<Image> {
     let bytes = STANDARD.decode(data).ok()?;
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
     let mut rgba = vec![0; reader.output_buffer_size()?];
@@ -127,7 +127,7 @@ pub fn hex([r, g, b]: [u8; 3]) -> String {
 }
 
 /// Places pictures on a white still of this size.
-pub fn pasted([width, height]: [usize; 2], pictures: &[([usize; 2], Image)]) -> Image {
+pub fn paste([width, height]: [usize; 2], pictures: &[([usize; 2], Image)]) -> Image {
     let mut rgba = vec![255; 4 * width * height];
     for ([left, top], picture) in pictures {
         let picture = picture.clone().on([255; 3]);
