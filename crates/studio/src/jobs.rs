@@ -129,7 +129,10 @@ impl Job {
 pub enum Event {
     Job(Box<Job>),
     /// The project has changed.
-    Project,
+    Project {
+        /// Name of the page that asked for the change; empty if none did.
+        by: String,
+    },
 }
 
 /// Source of the commands that make kits.
@@ -170,10 +173,10 @@ impl Jobs {
         self.events.subscribe()
     }
 
-    /// Tells all pages that the project has changed.
-    pub fn tell_project(&self) {
+    /// Tells all pages that the project has changed, and which page changed it.
+    pub fn tell_project(&self, by: String) {
         // Sending fails if no page listens, which is no error.
-        let _ = self.events.send(Event::Project);
+        let _ = self.events.send(Event::Project { by });
     }
 
     /// Lists all jobs, the oldest first.
@@ -257,7 +260,7 @@ impl Jobs {
             Ok(ended) => {
                 self.maker.on_end(ended.code, &ended.output);
                 self.change(id, |job| job.end(&ended));
-                self.tell_project();
+                self.tell_project(String::new());
             }
             Err(refusal) => {
                 self.change(id, |job| {

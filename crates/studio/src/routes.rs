@@ -5,8 +5,9 @@ use std::io::Write;
 use std::sync::Arc;
 
 use axum::body::{Body, Bytes};
-use axum::extract::{DefaultBodyLimit, Path, Query, State};
+use axum::extract::{DefaultBodyLimit, FromRequestParts, Path, Query, State};
 use axum::http::header;
+use axum::http::request::Parts;
 use axum::middleware::from_fn_with_state;
 use axum::response::sse::{self, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -81,13 +82,29 @@ async fn apart<T: Send + 'static>(
     })
 }
 
+/// Name that a page gives itself, so that it knows its own changes when it hears of them.
+struct PageName(String);
+
+impl<S: Sync> FromRequestParts<S> for PageName {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        let name = parts
+            .headers
+            .get("x-shellock-page")
+            .and_then(|name| name.to_str().ok());
+        Ok(Self(name.unwrap_or_default().to_owned()))
+    }
+}
+
 /// Runs work as [`apart`] does, then tells all open pages that the project has changed.
 async fn change<T: Send + 'static>(
     studio: &Studio,
+    PageName(by): PageName,
     work: impl FnOnce(&Bench) -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refusal> {
     let done = apart(studio, work).await?;
-    studio.jobs.tell_project();
+    studio.jobs.tell_project(by);
     Ok(done)
 }
 
@@ -105,8 +122,12 @@ async fn options(State(studio): State<Studio>) -> Answer<Vec<Offer>> {
     apart(&studio, |bench| Ok(Json(bench.options()))).await
 }
 
-async fn choose(State(studio): State<Studio>, Json(changes): Json<Map<String, Value>>) -> Answer<Vec<Offer>> {
-    change(&studio, move |bench| {
+async fn choose(
+    State(studio): State<Studio>,
+    page: PageName,
+    Json(changes): Json<Map<String, Value>>,
+) -> Answer<Vec<Offer>> {
+    change(&studio, page, move |bench| {
         bench.choose(&changes)?;
         Ok(Json(bench.options()))
     })
@@ -118,9 +139,17 @@ struct Named {
     name: String,
 }
 
-async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Body) -> Answer<Shown> {
+async fn open(
+    State(studio): State<Studio>,
+    page: PageName,
+    Query(named): Query<Named>,
+    body: Body,
+) -> Answer<Shown> {
     let file = store_body(&studio, body).await?;
-    change(&studio, move |bench| bench.open_file(&named.name, file.path())).await?;
+    change(&studio, page, move |bench| {
+        bench.open_file(&named.name, file.path())
+    })
+    .await?;
     project(State(studio)).await
 }
 
@@ -144,8 +173,12 @@ async fn store_body(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFi
     Ok(file)
 }
 
-async fn open_figure(State(studio): State<Studio>, Json(named): Json<Named>) -> Answer<Shown> {
-    change(&studio, move |bench| bench.open_figure(&named.name)).await?;
+async fn open_figure(
+    State(studio): State<Studio>,
+    page: PageName,
+    Json(named): Json<Named>,
+) -> Answer<Shown> {
+    change(&studio, page, move |bench| bench.open_figure(&named.name)).await?;
     project(State(studio)).await
 }
 
@@ -157,16 +190,18 @@ async fn mesh(State(studio): State<Studio>) -> Result<Response, Refusal> {
     apart(&studio, |bench| bench.mesh()).await.map(bytes)
 }
 
-async fn divide(State(studio): State<Studio>) -> Answer<Divided> {
-    change(&studio, |bench| bench.divide()).await.map(Json)
+async fn divide(State(studio): State<Studio>, page: PageName) -> Answer<Divided> {
+    change(&studio, page, |bench| bench.divide()).await.map(Json)
 }
 
 async fn labels(State(studio): State<Studio>) -> Result<Response, Refusal> {
     apart(&studio, |bench| bench.labels()).await.map(bytes)
 }
 
-async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer<Divided> {
-    change(&studio, move |bench| bench.paint(&body)).await.map(Json)
+async fn paint(State(studio): State<Studio>, page: PageName, body: Bytes) -> Answer<Divided> {
+    change(&studio, page, move |bench| bench.paint(&body))
+        .await
+        .map(Json)
 }
 
 async fn judge(State(studio): State<Studio>) -> Answer<Judgement> {
@@ -177,12 +212,12 @@ async fn cut(State(studio): State<Studio>) -> Result<Response, Refusal> {
     apart(&studio, |bench| bench.cut()).await.map(bytes)
 }
 
-async fn mend(State(studio): State<Studio>) -> Answer<Divided> {
-    change(&studio, |bench| bench.mend()).await.map(Json)
+async fn mend(State(studio): State<Studio>, page: PageName) -> Answer<Divided> {
+    change(&studio, page, |bench| bench.mend()).await.map(Json)
 }
 
-async fn mirror(State(studio): State<Studio>) -> Answer<Divided> {
-    change(&studio, |bench| bench.mirror()).await.map(Json)
+async fn mirror(State(studio): State<Studio>, page: PageName) -> Answer<Divided> {
+    change(&studio, page, |bench| bench.mirror()).await.map(Json)
 }
 
 #[derive(Deserialize)]
@@ -190,8 +225,12 @@ struct Place {
     at: [f64; 3],
 }
 
-async fn place_key(State(studio): State<Studio>, Json(place): Json<Place>) -> Answer<Vec<Offer>> {
-    change(&studio, move |bench| {
+async fn place_key(
+    State(studio): State<Studio>,
+    page: PageName,
+    Json(place): Json<Place>,
+) -> Answer<Vec<Offer>> {
+    change(&studio, page, move |bench| {
         bench.place_key(place.at)?;
         Ok(Json(bench.options()))
     })
@@ -211,11 +250,18 @@ async fn events(State(studio): State<Studio>) -> Sse<impl Stream<Item = Result<s
     let told = BroadcastStream::new(studio.jobs.events()).map(|event| {
         Ok(match event {
             Ok(Event::Job(job)) => sse::Event::default().event("job").data(json!(job).to_string()),
+            Ok(Event::Project { by }) => project_event(&by),
             // After missed events, the page reloads all of the project.
-            Ok(Event::Project) | Err(_) => sse::Event::default().event("project").data("{}"),
+            Err(_) => project_event(""),
         })
     });
     Sse::new(told).keep_alive(KeepAlive::default())
+}
+
+fn project_event(by: &str) -> sse::Event {
+    sse::Event::default()
+        .event("project")
+        .data(json!({ "by": by }).to_string())
 }
 
 async fn archive(State(studio): State<Studio>) -> Result<Response, Refusal> {

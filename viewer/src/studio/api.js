@@ -12,6 +12,8 @@ function takeToken() {
 }
 
 const token = takeToken();
+// Pages hear of every change; by its name a page knows its own.
+const pageName = Math.random().toString(36).slice(2);
 
 /** What the server refused, in its words. */
 export class Refused extends Error {
@@ -22,7 +24,7 @@ export class Refused extends Error {
 }
 
 async function ask(method, path, { body, type, signal } = {}) {
-  const headers = { Authorization: `Bearer ${token}` };
+  const headers = { Authorization: `Bearer ${token}`, "X-Shellock-Page": pageName };
   if (type) headers["Content-Type"] = type;
   const answer = await fetch(`/api/${path}`, { method, headers, body, signal });
   if (answer.ok) return answer;
@@ -67,11 +69,11 @@ export const api = {
 export const kitUrl = (name) => `/kit/${token}/${name.split("/").map(encodeURIComponent).join("/")}`;
 export const zipUrl = () => `/api/kit.zip?token=${token}`;
 
-/** Calls `on.job` and `on.project` with what happens, and `on.lost` or `on.found` where the server goes or comes back. */
+/** Calls `on.job` and `on.project` with what happens, the latter also with whether this page caused it, and `on.lost` or `on.found` where the server goes or comes back. */
 export function listen(on) {
   const events = new EventSource(`/api/events?token=${token}`);
   events.addEventListener("job", (e) => on.job(JSON.parse(e.data)));
-  events.addEventListener("project", () => on.project());
+  events.addEventListener("project", (e) => on.project(JSON.parse(e.data).by === pageName));
   events.addEventListener("open", () => on.found());
   events.addEventListener("error", () => on.lost());
 }

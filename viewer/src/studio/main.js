@@ -17,7 +17,7 @@ const $ = (id) => document.getElementById(id);
 
 const state = { step: "open", project: { model: null, division: null, kit: null, figures: [] }, options: [], judged: null, isJudging: false, pieces: [], piece: 0, job: null };
 let [surface, history, base, view, tools] = [null, null, null, null, null];
-let [judging, saving, isMine] = [null, Promise.resolve(), 0];
+let [judging, saving] = [null, Promise.resolve()];
 
 // What goes wrong is said on the page, whatever asked for it.
 const guarded = (work) => async (...args) => {
@@ -141,19 +141,13 @@ async function divide() {
   busy(words.working.dividing);
   draw();
   try {
-    await asMine(() => insist(api.divide));
+    await insist(api.divide);
     base = null;
     await takeLabels();
     await refresh();
   } finally {
     busy("");
   }
-}
-
-// What this page changes is no news to it.
-async function asMine(work) {
-  isMine += 1;
-  try { return await work(); } finally { setTimeout(() => { isMine -= 1; }, 300); }
 }
 
 /** What was painted goes to the server, one after the other; then it is judged. */
@@ -164,7 +158,7 @@ function save() {
   draw();
   const labels = history.labels.slice();
   saving = saving.then(guarded(async () => {
-    const { is_changed: isChanged, n_pieces: n } = await asMine(() => insist(() => api.paint(labels)));
+    const { is_changed: isChanged, n_pieces: n } = await insist(() => api.paint(labels));
     state.project.division = { ...state.project.division, n_pieces: n, origin: "painted" };
     if (isChanged) { history.labels.set(await api.labels()); view.paint(history.labels); counted(); }
     await judge();
@@ -194,29 +188,29 @@ const judge = guarded(async () => {
 const act = {
   step,
   look: (at) => view.lookAt(at),
-  open: guarded(async (file) => { busy(words.working.opening); try { await asMine(() => api.open(file)); await load(); } finally { busy(""); } }),
-  figure: guarded(async (name) => { busy(words.working.opening); try { await asMine(() => api.figure(name)); await load(); } finally { busy(""); } }),
+  open: guarded(async (file) => { busy(words.working.opening); try { await api.open(file); await load(); } finally { busy(""); } }),
+  figure: guarded(async (name) => { busy(words.working.opening); try { await api.figure(name); await load(); } finally { busy(""); } }),
   choose: guarded(async (changes) => {
     const names = Object.keys(changes);
-    try { state.options = await asMine(() => api.choose(changes)); } catch (e) { draw(); throw e; }
+    try { state.options = await api.choose(changes); } catch (e) { draw(); throw e; }
     say("");
     if (names.some((n) => OF_MODEL.has(n))) await load();
     else if (names.some((n) => OF_DIVISION.has(n)) && state.project.division?.origin === "automatic") { await divide(); judge(); }
     else { await refresh(); draw(); judge(); }
   }),
   chooseDivision: guarded(async (changes) => {
-    try { state.options = await asMine(() => api.choose(changes)); } catch (e) { draw(); throw e; }
+    try { state.options = await api.choose(changes); } catch (e) { draw(); throw e; }
     await divide();
     draw();
     judge();
   }),
   divide: guarded(async () => { await divide(); draw(); judge(); }),
-  mend: guarded(async () => { await asMine(() => insist(api.mend)); await takeLabels(); await refresh(); draw(); judge(); }),
+  mend: guarded(async () => { await insist(api.mend); await takeLabels(); await refresh(); draw(); judge(); }),
   mirror: guarded(async () => {
     busy(words.working.mirror);
-    try { await asMine(() => insist(api.mirror)); await takeLabels(); await refresh(); draw(); judge(); } finally { busy(""); }
+    try { await insist(api.mirror); await takeLabels(); await refresh(); draw(); judge(); } finally { busy(""); }
   }),
-  placeKey: guarded(async (at) => { state.options = await asMine(() => api.placeKey(at)); draw(); judge(); }),
+  placeKey: guarded(async (at) => { state.options = await api.placeKey(at); draw(); judge(); }),
   make: guarded(async () => { await saving; state.job = await api.make(); draw(); }),
   stop: guarded(async (id) => { state.job = await api.stop(id); draw(); }),
   chose: (piece) => { [state.piece, state.isFresh] = [piece, false]; say(words.hints.chosen(piece + 1)); draw(); },
@@ -248,8 +242,8 @@ const heard = {
     if (["verified", "failed"].includes(job.state)) { await refresh(); if (state.step === "make") step("kit"); }
     if (state.step === "make") draw();
   }),
-  project: guarded(async () => {
-    if (isMine > 0) { await refresh(); return; }
+  project: guarded(async (isMine) => {
+    if (isMine) { await refresh(); return; }
     const { revision } = state.project;
     await refresh();
     if (state.project.revision !== revision && !state.isJudging) await load();
