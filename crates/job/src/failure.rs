@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use shellock::MakeError;
 use shellock::design::DesignError;
 use shellock::stress_test::StressError;
 use shellock_formats::ReadError;
@@ -122,7 +123,7 @@ impl Failure {
             | Self::Stress(StressError::Cancelled(_))
             | Self::Design(DesignError::Cancelled(_)) => 130,
             Self::NoPlan { .. } => 3,
-            Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,
+            Self::Unwritable { .. } | Self::Design(DesignError::Make(MakeError::Piece(_))) => 4,
             _ => 2,
         }
     }

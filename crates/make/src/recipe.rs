@@ -7,7 +7,7 @@ use shellock_geom::Aabb;
 use shellock_plan::lesson::{Lesson, WeakJoint};
 use shellock_plan::sizes::{CONTACT_SIZES, ConnectorSizes};
 use shellock_plan::{Handover, LatticePlan};
-use shellock_report::{Ctx, IdVec, PatchId, Warning};
+use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
 use shellock_surface::SegmentedSurface;
 use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
 
@@ -41,10 +41,31 @@ pub struct Recipe<'a> {
 pub enum MakeError {
     /// The wall cannot be split.
     #[error(transparent)]
-    Body(#[from] BodyError),
+    Body(BodyError),
     /// A piece cannot be finished.
     #[error(transparent)]
-    Piece(#[from] PieceError),
+    Piece(PieceError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<BodyError> for MakeError {
+    fn from(e: BodyError) -> Self {
+        match e {
+            BodyError::Cancelled(stop) => stop.into(),
+            other => Self::Body(other),
+        }
+    }
+}
+
+impl From<PieceError> for MakeError {
+    fn from(e: PieceError) -> Self {
+        match e {
+            PieceError::Cancelled(stop) => stop.into(),
+            other => Self::Piece(other),
+        }
+    }
 }
 
 /// Makes the pieces of a plan: the wall, split along it; connectors under the seams; finished meshes. Also

@@ -67,11 +67,7 @@ pub fn design(
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
     let params = &resolve_params(params, model, labels)?;
-    let input = Input {
-        params,
-        model,
-        labels,
-    };
+    let input = Input::new(params, model, labels);
     let grade = |kit: &Kit| (kit.grade(), kit.failures());
     let (best, agenda, effort) = run(ctx, input, attempt::make_kit, grade)?;
     best.conclude(ctx, &input, &agenda, effort)
@@ -222,22 +218,18 @@ impl Planned {
     fn new(
         turn: &Turn,
         surface: &SegmentedSurface,
-        Chosen {
-            search_result: found,
-            holding,
-            ..
-        }: Chosen,
+        choice: Chosen,
         [of_plan, of_wall]: [Vec<Warning>; 2],
     ) -> Self {
-        let (proof, mean_cost, n_plans) = (found.proof(), found.score.mean, found.pool.len());
+        let (proof, found) = (choice.search_result.proof(), choice.search_result);
         let handover = Handover::new(turn, found.plan);
         Self {
             surface: handover.surface(surface),
             plan: handover.plan(),
             proof: handover.proof(proof),
-            mean_cost,
-            n_plans,
-            holding: holding.hand_over(&handover),
+            mean_cost: found.score.mean,
+            n_plans: found.pool.len(),
+            holding: choice.holding.hand_over(&handover),
             warnings: [handover.warnings(of_plan), of_wall].concat(),
         }
     }
@@ -252,11 +244,7 @@ pub fn plan(
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, NoPlan>, DesignError> {
     let params = &resolve_params(params, model, labels)?;
-    let input = Input {
-        params,
-        model,
-        labels,
-    };
+    let input = Input::new(params, model, labels);
     let grade = |_: &Planned| (Grade::PERFECT, Vec::new());
     let (best, agenda, _) = run(ctx, input, attempt::seek_plan, grade)?;
     best.conclude(ctx, &agenda)

@@ -46,7 +46,7 @@ pub use shellock_assembly::{
 };
 pub use shellock_divide::{key, segmentation};
 pub use shellock_figures as figure;
-pub use shellock_make::{body, connector, coupon, piece};
+pub use shellock_make::{MakeError, body, connector, coupon, piece};
 pub use shellock_plan as plan;
 pub use shellock_plan::sizes::{self, ConnectorSizes};
 pub use shellock_rate::{handling, metric, strength, stress_test};

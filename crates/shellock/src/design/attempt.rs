@@ -13,7 +13,7 @@ use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams};
 use crate::plan::lesson::Lesson;
 use crate::plan::{LatticePlan, PlanOutcome, RankedPlan};
 use crate::segmentation::join;
-use crate::{Cancelled, Ctx, PatchId, key, metric, plan};
+use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 
 /// Result of an attempt.
 pub(super) struct Found<T> {
@@ -79,12 +79,27 @@ pub(super) fn make_kit(
         distances,
         choice,
     };
-    let found = match kit_or_lesson(make(kit_ctx, recipe))? {
+    let learned = &mut setup.lessons;
+    let found = match make(kit_ctx, recipe) {
         Ok(kit) => {
             parts.effort.kits += 1;
-            learn(ctx, division, &mut setup.lessons, kit, allowance)?
+            learn(ctx, division, learned, kit, allowance)?
         }
-        Err(lesson) => give_up(ctx, division, &mut setup.lessons, &lesson, allowance)?,
+        // A piece that cannot take enough of its wall along costs only the plan.
+        Err(DesignError::Make(MakeError::Body(BodyError::Blocked {
+            piece,
+            separation,
+            free_share,
+        }))) => {
+            let lesson = Lesson::Blocked {
+                piece,
+                separation,
+                free_share,
+            };
+            learned.add(&lesson);
+            another_plan(ctx, division, learned, (Step::Replan, &[lesson]), allowance)?
+        }
+        Err(e) => return Err(e),
     };
     Ok(Found {
         late: late.or(found.late),
@@ -157,40 +172,6 @@ fn plan_or_changes<T>(
             }
         },
     ))
-}
-
-/// Returns the kit, or the lesson of a piece that something blocks.
-fn kit_or_lesson(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>, DesignError> {
-    match made {
-        Err(DesignError::Body(BodyError::Blocked {
-            piece,
-            separation,
-            free_share: kept,
-        })) => Ok(Err(Lesson::Blocked {
-            piece,
-            separation,
-            free_share: kept,
-        })),
-        made => made.map(Ok),
-    }
-}
-
-/// Gives a plan up, since a piece cannot move out with enough of its wall.
-fn give_up(
-    ctx: &Ctx,
-    division: &Division,
-    learned: &mut Learned,
-    lesson: &Lesson,
-    allowance: &Allowance,
-) -> Result<Found<Kit>, DesignError> {
-    learned.add(lesson);
-    another_plan(
-        ctx,
-        division,
-        learned,
-        (Step::Replan, std::slice::from_ref(lesson)),
-        allowance,
-    )
 }
 
 /// Learns from a kit what may help.
@@ -289,9 +270,7 @@ pub(super) fn next_plan(
     former: &mut Option<LatticePlan>,
 ) -> Result<Next, DesignError> {
     let division = planning.division;
-    let Division {
-        surface, settings, ..
-    } = division;
+    let (surface, settings) = (&division.surface, &division.settings);
     if surface.n_patches == 2 {
         return Ok(Next::None(Failure::of_two()));
     }

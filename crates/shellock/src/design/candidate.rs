@@ -71,34 +71,30 @@ impl<'a> Candidate<'a> {
         job: &Job<'_>,
         surface: SegmentedSurface,
     ) -> Result<Option<Division>, DesignError> {
-        let given = self.settings(job);
+        let mut settings = self.settings(job);
         let Some(key) = &self.key else {
-            let mut settings = given;
             settings.plan.key = job.key_of(&surface);
-            let chosen = self.sizes(ctx, job, &settings, &surface)?;
             return Ok(Some(Division {
+                sizes: self.sizes(ctx, job, &settings, &surface)?,
                 surface,
                 settings,
-                sizes: chosen,
                 grip: None,
                 changes: Vec::new(),
             }));
         };
-        let Some((surface, patch)) =
-            key::imprint_and_refine(ctx, &given.segmentation, &surface, &key.site.prism)?
-        else {
+        let cut = key::imprint_and_refine(ctx, &settings.segmentation, &surface, &key.site.prism)?;
+        let Some((surface, patch)) = cut else {
             return Ok(None);
         };
-        let settings = given.with_key(patch, key.along);
-        let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
+        settings = settings.with_key(patch, key.along);
+        let mut sizes = self.sizes(ctx, job, &settings, &surface)?;
         // The key was cut with room for rails of the usual size.
-        chosen.cap(patch, settings.connector.size.usual_mm());
-        let grip = job.input.params.has_grip.then(|| key.grip(patch));
+        sizes.cap(patch, settings.connector.size.usual_mm());
         Ok(Some(Division {
             surface,
             settings,
-            sizes: chosen,
-            grip,
+            sizes,
+            grip: job.input.params.has_grip.then(|| key.grip(patch)),
             changes: Vec::new(),
         }))
     }

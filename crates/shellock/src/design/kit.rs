@@ -148,9 +148,7 @@ pub(super) struct Recipe<'a> {
 /// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning.
 pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError> {
     let Recipe { division, choice, .. } = recipe;
-    let Division {
-        surface, settings, ..
-    } = division;
+    let (surface, settings) = (&division.surface, &division.settings);
     let (sizes, proof) = (&division.sizes.sizes, choice.search_result.proof());
     let handover = Handover::new(recipe.turn, choice.search_result.plan);
     let made = shellock_make::make(

@@ -2,24 +2,22 @@
 
 use shellock_assembly::{PrintedFit, fit};
 use shellock_geom::TriMesh;
-use shellock_make::MakeError;
 
 use super::agenda::{Agenda, Effort};
 use super::best::{Best, Kept};
 use super::causes::Cause;
 use super::ways::Input;
 use super::{KeySource, Kit, Planned, Settings};
-use crate::body::{BodyError, GridError};
+use crate::body::GridError;
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
-use crate::piece::PieceError;
 use crate::plan::Blocker;
 use crate::segmentation::{self, SegmentationError};
-use crate::strength::{NoRoom, Strength, StrengthError, TooThin};
+use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{ThinFeature, thin_places};
-use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
+use crate::{Cancelled, Ctx, IdVec, MakeError, PatchId, Warning};
 
 /// Finished kit and the wall that it is made of. Places are in the space of the model as given.
 #[non_exhaustive]
@@ -111,13 +109,8 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
         ..
     } = kept;
     let settings = wall.settings.clone();
-    let gaps = kit_gaps(
-        ctx,
-        Some(input.model),
-        &kit.pieces,
-        &kit.plan,
-        settings.body.rim_mm,
-    )?;
+    let rim_mm = settings.body.rim_mm;
+    let gaps = kit_gaps(ctx, Some(input.model), &kit.pieces, &kit.plan, rim_mm)?;
     let has_passed = kit.verification.has_passed();
     let fit = PrintedFit::of(ctx, &kit.assembly(input.model), &gaps, &kit.play, has_passed)?;
     let least_wall_mm = settings.connector.min_wall_mm;
@@ -158,7 +151,10 @@ fn key_warning(
     mut reasons: Vec<String>,
 ) -> Option<Warning> {
     match key {
-        Some(key) => (kit.rails_mm() <= 0.0).then(|| without_rails(kit, key)),
+        Some(site) => (kit.rails_mm() <= 0.0).then(|| {
+            let at = site.prism.origin.to_array();
+            Warning::new(Cause::KeyWithoutRails, vec![kit.plan.key()], Some(at))
+        }),
         None if !input.params.key.is_cut() => None,
         None => {
             if reasons.is_empty() {
@@ -169,30 +165,18 @@ fn key_warning(
                     _ => "nowhere is the surface flat, free and thick enough to cut one".into(),
                 });
             }
-            Some(not_cut(kit, reasons))
+            Some(Warning::new(
+                Cause::KeyNotCut { reasons },
+                vec![kit.plan.key()],
+                None,
+            ))
         }
     }
-}
-
-/// Warns that an uncut piece became the key, with the reasons.
-fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
-    let key = kit.plan.key();
-    Warning::new(Cause::KeyNotCut { reasons }, vec![key], None)
 }
 
 /// Warns that the time was over after so many kits; after none, the warning speaks of the plan.
 fn time_up(kits: usize) -> Warning {
     Warning::new(Cause::TimeUp { kits }, Vec::new(), None)
-}
-
-/// Warns that a cut key has no rails.
-fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
-    let key = kit.plan.key();
-    Warning::new(
-        Cause::KeyWithoutRails,
-        vec![key],
-        Some(site.prism.origin.to_array()),
-    )
 }
 
 /// Reason why the job could not be done.
@@ -204,24 +188,15 @@ pub enum DesignError {
     /// The surface cannot be divided.
     #[error(transparent)]
     Segmentation(SegmentationError),
-    /// The wall cannot be made.
+    /// There is no room for the wall.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// The wall cannot be split.
-    #[error(transparent)]
-    Body(BodyError),
     /// Plans cannot be compared.
     #[error(transparent)]
     Choice(ChoiceError),
-    /// A piece cannot be finished.
+    /// The wall cannot be split, or a piece cannot be finished.
     #[error(transparent)]
-    Piece(PieceError),
-    /// Too little of the model can be hollow.
-    #[error(transparent)]
-    TooThin(#[from] TooThin),
-    /// Connectors have no room behind the thinnest walls.
-    #[error(transparent)]
-    NoRoom(#[from] NoRoom),
+    Make(MakeError),
     /// No triangle has the label that the key is to have.
     #[error("no part of the model has the label {0}, which the key is to have")]
     NoLabelOfKey(i64),
@@ -247,19 +222,9 @@ macro_rules! from_stage {
     )+};
 }
 
-impl From<MakeError> for DesignError {
-    fn from(e: MakeError) -> Self {
-        match e {
-            MakeError::Body(e) => e.into(),
-            MakeError::Piece(e) => e.into(),
-        }
-    }
-}
-
 from_stage! {
     StrengthError => Strength,
     SegmentationError => Segmentation,
-    BodyError => Body,
     ChoiceError => Choice,
-    PieceError => Piece,
+    MakeError => Make,
 }

@@ -58,14 +58,14 @@ pub fn first_division(
     labels: Option<&[i64]>,
 ) -> Result<SegmentedSurface, DesignError> {
     let params = &resolve_params(params, model, labels)?;
-    let input = Input {
-        params,
+    let input = Input::new(params, model, labels);
+    let wall = Wall::nominal(params).with_way(ways::ways(&input)[0]);
+    Ok(segmentation::segment(
+        ctx,
+        &wall.settings.segmentation,
         model,
         labels,
-    };
-    let wall = Wall::nominal(params).with_way(ways::ways(&input)[0]);
-    let divided = segmentation::segment(ctx, &wall.settings.segmentation, model, labels)?;
-    Ok(divided)
+    )?)
 }
 
 /// Judges the first division that [`design`](super::design) makes kits of, with the wall as thick as `params`
@@ -84,21 +84,12 @@ pub fn outlook(
     let mut params = resolve_params(params, model, labels)?;
     params.proof_budget = 0;
     let params = &params;
-    let input = Input {
-        params,
-        model,
-        labels,
-    };
+    let input = Input::new(params, model, labels);
     let mut trial = Trial::new(input, Wall::nominal(params));
     trial.take_division(divided);
     let mut agenda = Agenda::of_keys(ctx, &input);
-    let best = explore(
-        &ctx.fork(),
-        &mut agenda,
-        &mut trial,
-        judge,
-        |verdict: &Verdict| (verdict.grade(), Vec::new()),
-    )?;
+    let grade = |verdict: &Verdict| (verdict.grade(), Vec::new());
+    let best = explore(&ctx.fork(), &mut agenda, &mut trial, judge, grade)?;
     let verdict = best.into_end()?;
     let (job, sites) = trial.into_division();
     let job = job.expect("an end or an error came of a model that is divided");

@@ -11,7 +11,6 @@ use shellock_geom::{Solid, Vec3};
 use super::failure::Failure;
 use super::job::Job;
 use super::*;
-use crate::Progress;
 use crate::body::BodyError;
 use crate::connector::SeamRoom;
 use crate::key::{KeyPrism, KeySite, Turn};
@@ -22,16 +21,16 @@ use crate::plan::{Handover, PlanConstraints};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
 use crate::verify::Finding;
-use crate::{Cancelled, LatticeDirection, PatchId};
+use crate::{Cancelled, LatticeDirection, MakeError, PatchId, Progress};
 
 #[test]
 fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
     let stopped = [
         DesignError::from(StrengthError::Cancelled(Cancelled)),
         SegmentationError::Cancelled(Cancelled).into(),
-        BodyError::Cancelled(Cancelled).into(),
+        MakeError::from(BodyError::Cancelled(Cancelled)).into(),
         ChoiceError::Cancelled(Cancelled).into(),
-        PieceError::Cancelled(Cancelled).into(),
+        MakeError::from(PieceError::Cancelled(Cancelled)).into(),
     ];
     assert!(
         stopped.iter().all(|e| matches!(e, DesignError::Cancelled(_))),

@@ -297,14 +297,15 @@ impl Setup<'_> {
     /// Surveys the plans of the present pieces, unless that was done.
     pub fn survey_plans(&mut self, ctx: &Ctx) -> Result<(), DesignError> {
         if self.survey.is_none() {
-            let Division {
+            let (division, surface) = (&self.division, &self.division.surface);
+            let (params, sizes) = (&division.settings.plan, &division.sizes.sizes);
+            self.survey = Some(plan::survey(
+                &ctx.fork(),
+                params,
                 surface,
-                settings,
-                sizes: chosen,
-                ..
-            } = &self.division;
-            let (params, seams) = (&settings.plan, surface.seams());
-            self.survey = Some(plan::survey(&ctx.fork(), params, surface, &seams, &chosen.sizes)?);
+                &surface.seams(),
+                sizes,
+            )?);
         }
         Ok(())
     }
@@ -318,13 +319,9 @@ impl Setup<'_> {
 
     /// Forgets lessons of other connectors, and makes sure that the present ones will have room.
     fn begin_sizes(&mut self) {
-        let Division {
-            settings,
-            sizes: chosen,
-            ..
-        } = &self.division;
         (self.survey, self.lessons) = (None, Learned::default());
-        self.grid
-            .reserve(settings.connector.room_mm(chosen.sizes.largest_mm()));
+        let largest_mm = self.division.sizes.sizes.largest_mm();
+        let room_mm = self.division.settings.connector.room_mm(largest_mm);
+        self.grid.reserve(room_mm);
     }
 }

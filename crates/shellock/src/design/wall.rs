@@ -118,31 +118,30 @@ impl Wall {
 
     /// Warnings that follow from the facts.
     pub fn warnings(&self) -> Vec<Warning> {
-        let of_model = |cause| Warning::new(cause, Vec::new(), None);
         let params = &self.settings.strength;
-        let mut warnings = self.strength.as_ref().map_or(Vec::new(), |s| s.warnings(params));
-        warnings.extend(self.error.iter().map(|error| {
-            of_model(Cause::StrengthUnknown {
-                error: error.clone(),
-                thickness_mm: self.settings.body.thickness_mm,
-            })
-        }));
-        if self.is_free && self.thicker.is_none() {
-            let thinner = self.strength.as_ref().and_then(|s| s.told_thinner(params));
-            warnings.extend(thinner);
-        }
-        warnings.extend(
-            self.is_divided_otherwise
-                .then(|| of_model(Cause::DividedOtherwise)),
-        );
-        warnings.extend(self.thicker.as_ref().map(|(from_mm, thicker)| {
-            of_model(Cause::WallForUse {
-                from_mm: *from_mm,
-                to_mm: thicker.thickness_mm,
-                load: thicker.load.clone(),
-            })
-        }));
-        warnings
+        let strength = self.strength.as_ref();
+        let is_thin = self.is_free && self.thicker.is_none();
+        let thinner = strength.filter(|_| is_thin).and_then(|s| s.told_thinner(params));
+        let thickness_mm = self.settings.body.thickness_mm;
+        let unknown = |error| Cause::StrengthUnknown { error, thickness_mm };
+        let thicker = |(from_mm, thicker): (f64, Thicker)| Cause::WallForUse {
+            from_mm,
+            to_mm: thicker.thickness_mm,
+            load: thicker.load,
+        };
+        let of_choice = [
+            self.error.clone().map(unknown),
+            self.is_divided_otherwise.then_some(Cause::DividedOtherwise),
+            self.thicker.clone().map(thicker),
+        ];
+        let of_choice = of_choice.into_iter().flatten();
+        let of_strength = strength
+            .into_iter()
+            .flat_map(|s| s.warnings(params))
+            .chain(thinner);
+        of_strength
+            .chain(of_choice.map(|cause| Warning::new(cause, Vec::new(), None)))
+            .collect()
     }
 }
 

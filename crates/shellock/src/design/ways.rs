@@ -14,6 +14,16 @@ pub(super) struct Input<'a> {
     pub labels: Option<&'a [i64]>,
 }
 
+impl<'a> Input<'a> {
+    pub fn new(params: &'a Params, model: &'a Solid, labels: Option<&'a [i64]>) -> Self {
+        Self {
+            params,
+            model,
+            labels,
+        }
+    }
+}
+
 /// One way to divide a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Way {
