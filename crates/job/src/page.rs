@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
 use shellock::design::{Design, Kit, Settings};
 use shellock::verify::{Check, Finding, Play};
 use shellock::{IdVec, PatchId, Warning};
-use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::booklet::{Booklet, Borne, WeakPlace, looks};
 use shellock_render::{
@@ -27,9 +25,6 @@ use crate::tabs;
 use crate::told::{bearing, scope};
 use crate::upright::turn_upright;
 
-/// Tolerance of shown pieces, as a share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
-const SEEN: f64 = 3e-4;
-
 /// Builds the page, the picture, and the booklet if it is wanted. All show the model upright: `up` becomes z.
 pub fn report(
     model: &Model,
@@ -41,7 +36,7 @@ pub fn report(
     (figures, printing): (Vec<(String, String)>, &Printing),
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| turn_upright(options.up, v);
-    let shown = upright_pieces(design, stand);
+    let shown = upright_pieces(printing.simple_pieces(), stand);
     let standing = Standing::of(options.up, model.solid.mesh());
     let failed = design.kit.verification.findings.iter();
     let failed = failed.map(|finding| failure(finding, &standing));
@@ -56,9 +51,8 @@ pub fn report(
     let has_passed = design.kit.verification.has_passed();
     // A kit that failed is not to be printed.
     let tabs = if has_passed {
-        let made = design.kit.pieces.as_slice();
         vec![
-            tabs::print(printing, made, !options.no_booklet),
+            tabs::print(printing, !options.no_booklet),
             tabs::care(printing.printer()),
         ]
     } else {
@@ -211,22 +205,12 @@ fn failure(finding: &Finding, standing: &Standing) -> Warning {
 }
 
 /// Upright pieces, simplified to a tolerance that the eye cannot see.
-fn upright_pieces(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
-    let all = design
-        .kit
-        .pieces
-        .as_slice()
-        .iter()
-        .fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
-    let tolerance_mm = SEEN * all.diagonal();
-    let shown = |mesh: &TriMesh| {
-        let mesh = decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
-        TriMesh {
-            points: mesh.points.iter().map(|&p| stand(p)).collect(),
-            triangles: mesh.triangles,
-        }
+fn upright_pieces(pieces: &[TriMesh], stand: impl Fn(Vec3) -> Vec3) -> Vec<TriMesh> {
+    let stand = |mesh: &TriMesh| TriMesh {
+        points: mesh.points.iter().map(|&p| stand(p)).collect(),
+        triangles: mesh.triangles.clone(),
     };
-    design.kit.pieces.as_slice().par_iter().map(shown).collect()
+    pieces.iter().map(stand).collect()
 }
 
 /// Facts about the kit that people ask for.

@@ -5,10 +5,10 @@ use shellock::{PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::decimate::decimate;
-use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::load::Load;
-use shellock_print::plates::{Laid, Plates, Printable, lay, lay_alone};
+use shellock_print::plates::{Laid, Plates, Printable, Skin, lay, lay_alone};
 use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
@@ -16,8 +16,8 @@ use shellock_render::stills::{Camera, Painted, render};
 
 use crate::causes::Cause;
 
-/// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
-const SKIN_MM: f64 = 0.05;
+/// Tolerance of simple pieces, as a share of the kit's diagonal, in the mean: 0.07 mm on 240 mm.
+const SEEN: f64 = 3e-4;
 
 /// Colour of the plate in pictures.
 const BED: [u8; 3] = [226, 228, 232];
@@ -26,6 +26,8 @@ const BED: [u8; 3] = [226, 228, 232];
 pub struct Printing {
     printer: Printer,
     plates: Plates,
+    /// Pieces with few triangles, as they are shown.
+    simple: Vec<TriMesh>,
     /// Cost of all plates, and of the whole model as people print it, by closed forms; `None` if it cannot be
     /// laid.
     cost: Cost,
@@ -38,8 +40,14 @@ impl Printing {
     /// Lays `pieces` on plates of `printer`. Faces of theirs on `surface` are the visible skin; `solid` is
     /// the model.
     pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
+        let simple = simplify(pieces);
         let skin = TriangleBvh::new(surface);
-        let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
+        let printable = |(mesh, simple)| Printable {
+            mesh,
+            simple,
+            skin: Skin::On(&skin),
+        };
+        let printables: Vec<Printable<'_>> = pieces.iter().zip(&simple).map(printable).collect();
         let plates = lay(printer, &printables);
         let mut loads = vec![Load::default(); plates.n_plates];
         for laid in &plates.poses {
@@ -52,6 +60,7 @@ impl Printing {
         Self {
             printer: printer.clone(),
             plates,
+            simple,
             cost: loads
                 .iter()
                 .fold(Cost::default(), |sum, load| sum.and(Cost::of(printer, load))),
@@ -155,15 +164,20 @@ impl Printing {
         figures
     }
 
+    /// Returns the pieces in assembled position with few triangles, as they are shown.
+    pub fn simple_pieces(&self) -> &[TriMesh] {
+        &self.simple
+    }
+
     /// Renders each plate from above, as PNG.
-    pub fn pictures(&self, pieces: &[TriMesh]) -> Vec<Vec<u8>> {
+    pub fn pictures(&self) -> Vec<Vec<u8>> {
         (0..self.plates.n_plates)
             .into_par_iter()
-            .map(|plate| self.picture(plate, pieces))
+            .map(|plate| self.picture(plate))
             .collect()
     }
 
-    fn picture(&self, plate: usize, pieces: &[TriMesh]) -> Vec<u8> {
+    fn picture(&self, plate: usize) -> Vec<u8> {
         const WIDTH: usize = 640;
         let [width, depth, _] = self.printer.bed_mm;
         let laid: Vec<(usize, TriMesh)> = self
@@ -171,7 +185,7 @@ impl Printing {
             .poses
             .iter()
             .filter(|l| l.plate == plate)
-            .map(|l| (l.piece, pose(l, &pieces[l.piece])))
+            .map(|l| (l.piece, pose(l, &self.simple[l.piece])))
             .collect();
         let bed = TriMesh {
             points: [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]]
@@ -243,22 +257,19 @@ impl Printing {
     }
 }
 
-/// Piece in its pose on the plate, coarse enough for a picture.
-fn pose(laid: &Laid, piece: &TriMesh) -> TriMesh {
-    const SEEN_MM: f64 = 0.15;
-    let coarse = decimate(piece.clone(), &vec![SEEN_MM; piece.points.len()]);
-    TriMesh {
-        points: coarse.points.iter().map(|&p| laid.place(p)).collect(),
-        triangles: coarse.triangles,
-    }
+/// Returns the pieces with fewer triangles, as they are shown.
+pub fn simplify(pieces: &[TriMesh]) -> Vec<TriMesh> {
+    let all = pieces.iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
+    let tolerance_mm = SEEN * all.diagonal();
+    let simple = |mesh: &TriMesh| decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
+    pieces.par_iter().map(simple).collect()
 }
 
-/// Marks the faces of a piece that lie on the model's surface.
-fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
-    let is_outer = |f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
-    Printable {
-        mesh,
-        is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect(),
+/// Piece in its pose on the plate.
+fn pose(laid: &Laid, piece: &TriMesh) -> TriMesh {
+    TriMesh {
+        points: piece.points.iter().map(|&p| laid.place(p)).collect(),
+        triangles: piece.triangles.clone(),
     }
 }
 

@@ -2,7 +2,6 @@
 //! together.
 
 use shellock::PatchId;
-use shellock_geom::TriMesh;
 use shellock_kit::plan_file::piece_file;
 use shellock_print::booklet::Section;
 use shellock_print::{Printer, Process};
@@ -11,8 +10,8 @@ use shellock_render::{ReportPart, ReportTab};
 use crate::printing::Printing;
 
 /// Tab of the page on printing.
-pub fn print(printing: &Printing, pieces: &[TriMesh], has_booklet: bool) -> ReportTab {
-    let pictures = printing.pictures(pieces);
+pub fn print(printing: &Printing, has_booklet: bool) -> ReportTab {
+    let pictures = printing.pictures();
     let of = pictures.len();
     let mut parts = vec![
         ReportPart::Table("Plates, time and material".into(), printing.figures()),
@@ -26,7 +25,7 @@ pub fn print(printing: &Printing, pieces: &[TriMesh], has_booklet: bool) -> Repo
     );
     parts.push(ReportPart::Files(
         "Files".into(),
-        file_list(of, pieces.len(), has_booklet),
+        file_list(of, printing.simple_pieces().len(), has_booklet),
     ));
     ReportTab {
         name: "Print".into(),

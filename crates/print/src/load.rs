@@ -87,6 +87,14 @@ impl Load {
 
     /// Computes [`Self::of`] from columns of the mesh whose lines run along `up`.
     pub(crate) fn of_columns(mesh: &TriMesh, up: Vec3, printer: &Printer, columns: &Columns) -> Self {
+        let mut load = Self::without_slices(mesh, up, printer, columns);
+        load.add_slices(printer, columns);
+        load
+    }
+
+    /// Computes the figures that need no slices, which take most of the time. A resin printer's time and
+    /// material follow from these alone.
+    pub(crate) fn without_slices(mesh: &TriMesh, up: Vec3, printer: &Printer, columns: &Columns) -> Self {
         let mut load = Self {
             height_mm: columns.height_mm,
             volume_mm3: mesh.signed_volume(),
@@ -96,18 +104,25 @@ impl Load {
             return load;
         }
         load.shadow_mm2 = columns.shadow().count() as f64 * columns.cell_mm2();
-        let supports = Supports::of(columns, printer.layer_mm);
-        load.support_mm3 = supports.volume_mm3(columns);
-        if printer.process == Process::Sla {
-            Resin::of(columns).add_slices(columns, &mut load);
-            return load;
+        load.support_mm3 = Supports::of(columns, printer.layer_mm).volume_mm3(columns);
+        if printer.process == Process::Fdm {
+            load.top_mm2 = (0..mesh.triangles.len())
+                .map(|face| mesh.double_area_vector(face).dot(up).max(0.0) / 2.0)
+                .sum();
         }
-        load.top_mm2 = (0..mesh.triangles.len())
-            .map(|face| mesh.double_area_vector(face).dot(up).max(0.0) / 2.0)
-            .sum();
-        let solid_mm = SOLID_LAYERS * printer.layer_mm;
-        Filament::of(columns).add_slices(columns, &supports, solid_mm, &mut load);
         load
+    }
+
+    /// Adds the figures of slices.
+    pub(crate) fn add_slices(&mut self, printer: &Printer, columns: &Columns) {
+        match printer.process {
+            Process::Sls => {}
+            Process::Sla => Resin::of(columns).add_slices(columns, self),
+            Process::Fdm => {
+                let (layer_mm, solid_mm) = (printer.layer_mm, SOLID_LAYERS * printer.layer_mm);
+                Filament::of(columns).add_slices(columns, &Supports::of(columns, layer_mm), solid_mm, self);
+            }
+        }
     }
 }
 

@@ -31,7 +31,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::causes::Cause;
 use falls::{Fallen, Falls};
-pub use hollow::{NoRoom, TooThin, has_room, is_hollow};
+pub use hollow::{Cavity, NoRoom, TooThin};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -16,16 +16,14 @@ use shellock_geom::weld::weld;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::load::Load;
-use shellock_print::plates::{Laid, Printable, lay, lay_alone};
+use shellock_print::plates::{Laid, Printable, Skin, lay, lay_alone};
 use shellock_print::time::{Cost, PLASTIC_FEATURES, TIME_FEATURES, plastic_features, time_features};
 
 use crate::failure::Failure;
 use crate::sheet::write_all;
 use crate::table::markdown;
 
-/// Distance from the model's surface, mm, within which a face's centre makes it part of the outer skin.
-const SKIN_MM: f64 = 0.05;
-/// Number of a form's features that belong to the piece itself; the rest belong to its supports.
+// Number of a form's features that belong to the piece itself; the rest belong to its supports.
 const N_OWN_TIME: usize = 4;
 const N_OWN_PLASTIC: usize = 3;
 /// Settings that differ from PrusaSlicer's defaults; the bed holds everything.
@@ -109,10 +107,10 @@ fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
     for folder in folders {
         let kit = Kit::read(folder)?;
         let skin = TriangleBvh::new(&kit.whole);
-        let is_outer = |mesh: &TriMesh, f| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
         let printable = |mesh| Printable {
             mesh,
-            is_outer: (0..mesh.triangles.len()).map(|f| is_outer(mesh, f)).collect(),
+            simple: mesh,
+            skin: Skin::On(&skin),
         };
         let printables: Vec<Printable<'_>> = kit.pieces.iter().map(printable).collect();
         let plates = lay(&printer, &printables);

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
-use super::Printable;
+use super::{Printable, Skin};
 use crate::columns::Columns;
 use crate::load::{Load, Supports};
 use crate::printer::{Printer, Process};
@@ -28,12 +28,12 @@ const N_SPREAD: u32 = 120;
 /// Cell width for the first judgement of all directions, mm. The best `N_AGAIN` of them are judged again with
 /// cells of 1 mm, and so are directions 6° off the best `N_NEAR`.
 const COARSE_MM: f64 = 2.0;
-/// Deviation of the simplified mesh for the first judgement, mm. It has a fifth of the piece's triangles.
-const SIMPLE_MM: f64 = 0.15;
-const N_AGAIN: usize = 8;
+/// Largest deviation of the simple mesh from the piece, mm.
+const DEVIATION_MM: f64 = 0.2;
+const N_AGAIN: usize = 4;
 /// Number of directions judged at once.
 const N_AT_ONCE: usize = 12;
-const N_NEAR: usize = 2;
+const N_NEAR: usize = 1;
 const NEAR_RAD: f64 = 0.1;
 /// Conditions for a stable piece, mm. Its foot is all that lies within `FOOT_MM` of the plate, with the
 /// supports. Its centre of mass must be above the foot, by `STANDING_MM` inside on all sides.
@@ -133,21 +133,18 @@ fn prices(process: Process) -> Prices {
 struct Judged {
     cost_s: f64,
     up: Vec3,
-    load: Load,
 }
 
 /// Finds the best pose within `room_mm`: width, depth and height. `None` if the piece is too large in every
 /// pose tried, or has no convex hull.
 pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
     let body = Body::of(piece)?;
-    let all = |directions: Vec<Vec3>, mesh: &TriMesh, cell_mm: f64| -> Vec<Judged> {
+    let all = |directions: Vec<Vec3>, cell_mm: f64, most_s: f64| -> Vec<Judged> {
         directions
             .into_par_iter()
-            .map(|up| body.judge(printer, up, mesh, cell_mm))
+            .map(|up| body.judge(printer, up, cell_mm, most_s))
             .collect()
     };
-    let simple = Volume::from_closed_mesh(piece.mesh).map(|volume| volume.simplify(SIMPLE_MM).to_mesh());
-    let simple = simple.as_ref().unwrap_or(piece.mesh);
     let mut coarse: Vec<Judged> = Vec::new();
     let mut rest = body.by_least_cost(printer);
     // A direction whose lower bound exceeds the cost of `N_AGAIN` judged ones cannot be among the best.
@@ -156,22 +153,38 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
             .drain(..rest.len().min(N_AT_ONCE))
             .map(|(_, up)| up)
             .collect();
-        coarse.extend(all(few, simple, COARSE_MM));
+        let most_s = coarse
+            .get(N_AGAIN - 1)
+            .map_or(f64::INFINITY, |judged| judged.cost_s);
+        coarse.extend(all(few, COARSE_MM, most_s));
         cheapest_first(&mut coarse);
     }
     let again: Vec<Vec3> = coarse.iter().take(N_AGAIN).map(|j| j.up).collect();
-    let mut fine = all(again, piece.mesh, crate::load::CELL_MM);
+    let mut fine = all(again, crate::load::CELL_MM, f64::INFINITY);
     cheapest_first(&mut fine);
     let near = fine.iter().take(N_NEAR).flat_map(|j| nearby(j.up)).collect();
-    fine.extend(all(near, piece.mesh, crate::load::CELL_MM));
+    fine.extend(all(near, crate::load::CELL_MM, f64::INFINITY));
     cheapest_first(&mut fine);
-    let judged = fine.into_iter().chain(coarse);
-    let unjudged = rest
-        .into_iter()
-        .map(|(_, up)| body.judge(printer, up, simple, COARSE_MM));
-    judged
+    let judged = fine.into_iter().chain(coarse).map(|judged| judged.up);
+    let unjudged = rest.into_iter().map(|(_, up)| up);
+    let turn = judged
         .chain(unjudged)
-        .find_map(|judged| body.best_turn(judged.up, judged.load, room_mm))
+        .find_map(|up| body.best_turn(up, room_mm))?;
+    Some(pose(printer, piece, turn))
+}
+
+/// Measures the piece, with all its triangles, in the pose that was found.
+fn pose(printer: &Printer, piece: &Printable<'_>, (axes, bounds): (Axes, Aabb)) -> Pose {
+    let (mesh, up) = (piece.mesh, axes[2]);
+    let overhangs = (0..mesh.triangles.len()).filter(|&f| -mesh.face_normal(f).dot(up) >= COS_OVERHANG);
+    let faces: Vec<Face> = overhangs.map(|f| Face::of(mesh, f, &piece.skin, 0.0)).collect();
+    let (x, y) = up.any_orthonormal_pair();
+    Pose {
+        axes,
+        bounds,
+        support: support(&faces, bounds.min.z, up),
+        load: Load::of(mesh, [x, y, up], printer),
+    }
 }
 
 /// Sorts stably, so that the first of equally good directions stays first.
@@ -183,7 +196,7 @@ fn cheapest_first(judged: &mut [Judged]) {
 pub(super) fn fits(piece: &Printable<'_>, room_mm: [f64; 3]) -> bool {
     Body::of(piece).is_some_and(|body| {
         let mut directions = body.directions().into_iter();
-        directions.any(|up| body.best_turn(up, Load::default(), room_mm).is_some())
+        directions.any(|up| body.best_turn(up, room_mm).is_some())
     })
 }
 
@@ -198,10 +211,15 @@ fn nearby(up: Vec3) -> Vec<Vec3> {
         .collect()
 }
 
+/// Axes of the plate in the frame of the piece.
+type Axes = [Vec3; 3];
+
 /// Properties of a piece that decide its orientation.
-struct Body {
+struct Body<'a> {
     hull: TriMesh,
     center: Vec3,
+    /// The simple mesh, and its faces.
+    mesh: &'a TriMesh,
     faces: Vec<Face>,
 }
 
@@ -212,24 +230,31 @@ struct Face {
     is_outer: bool,
 }
 
-impl Body {
-    fn of(piece: &Printable<'_>) -> Option<Self> {
-        let mesh = piece.mesh;
-        let hull = Volume::hull(&mesh.points).to_mesh();
+impl Face {
+    fn of(mesh: &TriMesh, f: usize, skin: &Skin<'_>, deviation_mm: f64) -> Self {
+        let center = mesh.face_center(f);
+        Self {
+            normal: mesh.face_normal(f),
+            center,
+            area_mm2: mesh.face_area(f),
+            is_outer: skin.holds(center, deviation_mm),
+        }
+    }
+}
+
+impl<'a> Body<'a> {
+    fn of(piece: &Printable<'a>) -> Option<Self> {
+        let hull = Volume::hull(&piece.mesh.points).to_mesh();
         if hull.triangles.is_empty() {
             return None;
         }
-        let face = |f: usize| Face {
-            normal: mesh.face_normal(f),
-            center: mesh.face_center(f),
-            area_mm2: mesh.face_area(f),
-            is_outer: piece.is_outer.get(f).copied().unwrap_or(false),
-        };
-        let faces = (0..mesh.triangles.len()).map(face).collect();
+        let mesh = piece.simple;
+        let face = |f: usize| Face::of(mesh, f, &piece.skin, DEVIATION_MM);
         Some(Self {
-            center: center_of_mass(mesh),
-            faces,
             hull,
+            center: center_of_mass(mesh),
+            mesh,
+            faces: (0..mesh.triangles.len()).map(face).collect(),
         })
     }
 
@@ -284,40 +309,32 @@ impl Body {
         all
     }
 
-    /// Judges the cost of a direction, with cells of `cell_mm`.
-    fn judge(&self, printer: &Printer, up: Vec3, mesh: &TriMesh, cell_mm: f64) -> Judged {
+    /// Judges the cost of a direction, with cells of `cell_mm`. A direction that costs more than `most_s` in
+    /// any case gets a lower bound of its cost that exceeds `most_s`.
+    fn judge(&self, printer: &Printer, up: Vec3, cell_mm: f64, most_s: f64) -> Judged {
         let prices = prices(printer.process);
         let (x, y) = up.any_orthonormal_pair();
-        let columns = Columns::of(mesh, [x, y, up], cell_mm);
-        let load = Load::of_columns(mesh, up, printer, &columns);
-        let mut cost_s = seconds(printer, &load)
-            + prices.gram_s * grams(printer, &load)
-            + prices.mark_s * self.support(up).outer_mm2
-            + prices.cup_s * load.cup_mm3
-            + prices.peel_s * load.widest_mm2;
+        let columns = Columns::of(self.mesh, [x, y, up], cell_mm);
+        let mut load = Load::without_slices(self.mesh, up, printer, &columns);
+        let marks_s = prices.mark_s * self.support(up).outer_mm2;
+        let printing_s =
+            |load: &Load| seconds(printer, load) + prices.gram_s * grams(printer, load) + marks_s;
+        if printer.process == Process::Sla && printing_s(&load) > most_s {
+            let cost_s = printing_s(&load);
+            return Judged { cost_s, up };
+        }
+        load.add_slices(printer, &columns);
+        let mut cost_s = printing_s(&load) + prices.cup_s * load.cup_mm3 + prices.peel_s * load.widest_mm2;
         if prices.falling_s > 0.0 && !self.stands(&columns, [x, y], printer.layer_mm) {
             cost_s += prices.falling_s;
         }
-        Judged { cost_s, up, load }
+        Judged { cost_s, up }
     }
 
-    /// Areas of overhanging faces with `up` as the vertical, except faces that rest on the plate.
+    /// Areas that need support with `up` as the vertical.
     fn support(&self, up: Vec3) -> Support {
         let heights = self.hull.points.iter().map(|p| p.dot(up));
-        let lowest = heights.fold(f64::INFINITY, f64::min);
-        let mut support = Support::default();
-        for face in &self.faces {
-            let downwards = -face.normal.dot(up);
-            let rests = face.center.dot(up) - lowest < RESTING_MM && downwards > COS_RESTING;
-            if downwards < COS_OVERHANG || rests {
-                continue;
-            }
-            support.all_mm2 += face.area_mm2;
-            if face.is_outer {
-                support.outer_mm2 += face.area_mm2;
-            }
-        }
-        support
+        support(&self.faces, heights.fold(f64::INFINITY, f64::min), up)
     }
 
     /// Returns true if the centre of mass is above the foot and the supports on the plate, with a margin.
@@ -348,35 +365,44 @@ impl Body {
         })
     }
 
-    /// Returns the turn about `up` with the smallest footprint that fits into `room_mm`, if any.
-    fn best_turn(&self, up: Vec3, load: Load, room_mm: [f64; 3]) -> Option<Pose> {
+    /// Returns the axes with `up` as the vertical that have the smallest footprint and fit into `room_mm`, if
+    /// any do, and the bounds of the piece in them.
+    fn best_turn(&self, up: Vec3, room_mm: [f64; 3]) -> Option<(Axes, Aabb)> {
         let (x, y) = up.any_orthonormal_pair();
-        let support = self.support(up);
-        let poses = (0..N_YAWS).map(|i| {
+        let turns = (0..N_YAWS).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_2 / f64::from(N_YAWS)).sin_cos();
             let axes = [cos * x + sin * y, cos * y - sin * x, up];
-            let bounds = Aabb::around(
-                self.hull
-                    .points
-                    .iter()
-                    .map(|p| Vec3::from_array(axes.map(|a| a.dot(*p)))),
-            );
-            Pose {
-                axes,
-                bounds,
-                support,
-                load,
-            }
+            let posed = |p: &Vec3| Vec3::from_array(axes.map(|a| a.dot(*p)));
+            (axes, Aabb::around(self.hull.points.iter().map(posed)))
         });
         let [width, depth, height] = room_mm;
-        let has_room = |pose: &Pose| {
-            let [a, b, c] = pose.bounds.size().to_array();
+        let has_room = |(_, bounds): &(Axes, Aabb)| {
+            let [a, b, c] = bounds.size().to_array();
             c <= height && (a <= width && b <= depth || b <= width && a <= depth)
         };
-        poses
+        let footprint_mm2 = |bounds: &Aabb| bounds.size().x * bounds.size().y;
+        turns
             .filter(has_room)
-            .min_by(|a, b| a.footprint_mm2().total_cmp(&b.footprint_mm2()))
+            .min_by(|a, b| footprint_mm2(&a.1).total_cmp(&footprint_mm2(&b.1)))
     }
+}
+
+/// Areas of overhanging faces with `up` as the vertical, except faces that rest on the plate at the height
+/// `lowest`.
+fn support(faces: &[Face], lowest: f64, up: Vec3) -> Support {
+    let mut support = Support::default();
+    for face in faces {
+        let downwards = -face.normal.dot(up);
+        let rests = face.center.dot(up) - lowest < RESTING_MM && downwards > COS_RESTING;
+        if downwards < COS_OVERHANG || rests {
+            continue;
+        }
+        support.all_mm2 += face.area_mm2;
+        if face.is_outer {
+            support.outer_mm2 += face.area_mm2;
+        }
+    }
+    support
 }
 
 fn center_of_mass(mesh: &TriMesh) -> Vec3 {

@@ -12,12 +12,11 @@ fn bowl() -> TriMesh {
         .to_mesh()
 }
 
-fn printable(mesh: &TriMesh, is_outer: impl Fn(Vec3) -> bool) -> Printable<'_> {
+fn printable<'a>(mesh: &'a TriMesh, skin: Skin<'a>) -> Printable<'a> {
     Printable {
         mesh,
-        is_outer: (0..mesh.triangles.len())
-            .map(|f| is_outer(mesh.face_center(f)))
-            .collect(),
+        simple: mesh,
+        skin,
     }
 }
 
@@ -27,9 +26,10 @@ fn on_plate(laid: &Laid, mesh: &TriMesh) -> Aabb {
 
 #[test]
 fn a_bowl_lies_with_no_support_on_its_skin() {
-    let mesh = bowl();
+    let (mesh, ball) = (bowl(), contoured_ball(20.0, 1.0));
+    let skin = TriangleBvh::new(&ball);
     for printer in [Printer::sla(), Printer::fdm()] {
-        let plates = lay(&printer, &[printable(&mesh, |p| p.length() > 19.0)]);
+        let plates = lay(&printer, &[printable(&mesh, Skin::On(&skin))]);
         let laid = plates.poses[0];
         assert_eq!(laid.outer_support_mm2, 0.0, "{}", printer.name);
         assert!(laid.support_mm2 > 0.0, "its inner side hangs over");
@@ -45,7 +45,7 @@ fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
                 .to_mesh()
         })
         .collect();
-    let pieces: Vec<Printable> = blocks.iter().map(|b| printable(b, |_| false)).collect();
+    let pieces: Vec<Printable> = blocks.iter().map(|b| printable(b, Skin::None)).collect();
     let printer = Printer {
         bed_mm: [100.0, 80.0, 90.0],
         ..Printer::fdm()
@@ -85,7 +85,7 @@ fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
     // The diagonal of 212 × 212 mm is 300.
     let plates = lay(
         &Printer::fdm(),
-        &[printable(&rod, |_| false), printable(&long, |_| false)],
+        &[printable(&rod, Skin::None), printable(&long, Skin::None)],
     );
     assert_eq!(
         (plates.too_large, plates.poses.len(), plates.n_plates),
@@ -108,7 +108,10 @@ fn nothing_needs_no_plate_and_a_flat_mesh_is_no_piece() {
         points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
         triangles: vec![[0, 1, 2]],
     };
-    assert_eq!(lay(&Printer::sla(), &[printable(&flat, |_| true)]).too_large, [0]);
+    assert_eq!(
+        lay(&Printer::sla(), &[printable(&flat, Skin::All)]).too_large,
+        [0]
+    );
 }
 
 #[test]
@@ -126,7 +129,7 @@ fn swaps_make_plates_no_worse_and_lose_no_piece() {
             .collect();
         let poses: Vec<(usize, Pose)> = boxes
             .iter()
-            .map(|mesh| orient::best(&printer, &printable(mesh, |_| false), room).unwrap())
+            .map(|mesh| orient::best(&printer, &printable(mesh, Skin::None), room).unwrap())
             .enumerate()
             .collect();
         let order: Vec<usize> = (0..poses.len()).collect();
@@ -139,4 +142,31 @@ fn swaps_make_plates_no_worse_and_lose_no_piece() {
         assert_eq!(packed, order);
     }
     assert!(n_better >= 3, "{n_better}");
+}
+
+#[test]
+fn poses_that_are_found_on_a_simple_mesh_cost_about_as_much_as_those_of_the_piece_itself() {
+    let mesh = bowl();
+    let simple = decimate(mesh.clone(), &vec![SIMPLE_MM; mesh.points.len()]);
+    assert!(2 * simple.triangles.len() < mesh.triangles.len());
+    for printer in [Printer::sla(), Printer::fdm()] {
+        let by = |simple| {
+            let piece = Printable {
+                simple,
+                ..printable(&mesh, Skin::All)
+            };
+            lay(&printer, &[piece]).poses[0]
+        };
+        let (exact, quick) = (by(&mesh), by(&simple));
+        let seconds = |laid: &Laid| crate::time::seconds(&printer, &laid.load);
+        assert!(
+            seconds(&quick) < 1.03 * seconds(&exact),
+            "{}: {quick:?}, {exact:?}",
+            printer.name
+        );
+        // Figures are those of the piece, whichever mesh the pose was found on.
+        let axes = [0, 1, 2].map(|row| Vec3::from_array(quick.axes.map(|column| column[row])));
+        let volume_mm3 = Load::of(&mesh, axes, &printer).volume_mm3;
+        assert_eq!(quick.load.volume_mm3, volume_mm3);
+    }
 }

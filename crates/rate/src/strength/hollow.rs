@@ -1,5 +1,7 @@
 //! Estimates of how much of a model can be hollow, before anything is made of it.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 use shellock_assembly::verify::sample::{Sample, on_surface};
 use shellock_geom::bvh::TriangleBvh;
@@ -71,51 +73,75 @@ fn thinner(better_mm: Option<f64>) -> String {
     better_mm.map_or_else(String::new, |mm| format!(", make its walls {mm:.2} mm thin"))
 }
 
-/// Checks that connectors have room behind walls of `wall_mm` somewhere; else proposes a size and walls.
-/// Takes a tenth of a second.
-pub fn has_room(model: &Solid, wall_mm: f64) -> Result<(), NoRoom> {
-    let mesh = model.mesh();
-    let mut thickest_mm = thickest_walls(mesh);
-    let n = thickest_mm.len() as f64;
-    let needed_mm = wall_mm + ROOM_MM;
-    let n_roomy = thickest_mm.iter().filter(|mm| **mm >= needed_mm).count();
-    if n_roomy as f64 >= LEAST_ROOM * n {
-        return Ok(());
-    }
-    thickest_mm.sort_by(|a, b| b.total_cmp(a));
-    let median_mm = thickest_mm[(PROPOSED_HOLLOW * n) as usize].max(THINNEST_MM);
-    let better_mm = median_mm - ROOM_MM;
-    Err(NoRoom {
-        thickness_mm: (1.0 + LEAST_SHARE) * median_mm,
-        wall_mm,
-        // Walls are tried in steps, so the size is a step too small.
-        size_mm: mesh.bounds().size().max_element() * STEP * needed_mm / median_mm,
-        better_mm: (better_mm >= THINNEST_PROPOSED_MM).then_some(better_mm),
-    })
+/// Estimates of one model's cavity with any wall. They rest on one measurement of the surface, made when it
+/// is first needed, which takes a few tenths of a second.
+#[derive(Debug, Default)]
+pub struct Cavity {
+    /// Thickest walls with a cavity below at points spread over the surface, mm, the thickest first.
+    thickest_mm: OnceLock<Vec<f64>>,
 }
 
-/// Checks that at least a third of the surface has a cavity below walls of `wall_mm`; else proposes a size
-/// and walls. Takes a tenth of a second.
-pub fn is_hollow(model: &Solid, wall_mm: f64) -> Result<(), TooThin> {
-    let mesh = model.mesh();
-    let mut thickest_mm = thickest_walls(mesh);
-    if thickest_mm.is_empty() {
-        return Ok(());
+impl Cavity {
+    /// Checks that connectors have room behind walls of `wall_mm` somewhere; else proposes a size and walls.
+    pub fn has_room(&self, model: &Solid, wall_mm: f64) -> Result<(), NoRoom> {
+        let needed_mm = wall_mm + ROOM_MM;
+        if self.share(model, needed_mm) >= LEAST_ROOM {
+            return Ok(());
+        }
+        let median_mm = self.median_mm(model);
+        let better_mm = median_mm - ROOM_MM;
+        Err(NoRoom {
+            thickness_mm: (1.0 + LEAST_SHARE) * median_mm,
+            wall_mm,
+            size_mm: self.size_mm(model, needed_mm),
+            better_mm: (better_mm >= THINNEST_PROPOSED_MM).then_some(better_mm),
+        })
     }
-    let n = thickest_mm.len() as f64;
-    let share = thickest_mm.iter().filter(|mm| **mm >= wall_mm).count() as f64 / n;
-    if share >= LEAST_HOLLOW {
-        return Ok(());
+
+    /// Checks that at least a third of the surface has a cavity below walls of `wall_mm`; else proposes a
+    /// size and walls.
+    pub fn is_hollow(&self, model: &Solid, wall_mm: f64) -> Result<(), TooThin> {
+        let share = self.share(model, wall_mm);
+        if share >= LEAST_HOLLOW {
+            return Ok(());
+        }
+        Err(TooThin {
+            share,
+            wall_mm,
+            size_mm: self.size_mm(model, wall_mm),
+            better_mm: self.median_mm(model),
+        })
     }
-    thickest_mm.sort_by(|a, b| b.total_cmp(a));
-    let better_mm = thickest_mm[(PROPOSED_HOLLOW * n) as usize].max(THINNEST_MM);
-    Err(TooThin {
-        share,
-        wall_mm,
-        // Walls are tried in steps, so the size is a step too small.
-        size_mm: mesh.bounds().size().max_element() * STEP * wall_mm / better_mm,
-        better_mm,
-    })
+
+    fn thickest_mm(&self, model: &Solid) -> &[f64] {
+        self.thickest_mm.get_or_init(|| {
+            let mut thickest_mm = thickest_walls(model.mesh());
+            thickest_mm.sort_by(|a, b| b.total_cmp(a));
+            thickest_mm
+        })
+    }
+
+    /// Share of the surface with a cavity below walls of this thickness, in [0, 1]; 1 without a surface.
+    fn share(&self, model: &Solid, wall_mm: f64) -> f64 {
+        let thickest_mm = self.thickest_mm(model);
+        if thickest_mm.is_empty() {
+            return 1.0;
+        }
+        thickest_mm.partition_point(|mm| *mm >= wall_mm) as f64 / thickest_mm.len() as f64
+    }
+
+    /// Thickness of walls with a cavity below half of the surface, mm.
+    fn median_mm(&self, model: &Solid) -> f64 {
+        let thickest_mm = self.thickest_mm(model);
+        thickest_mm[(PROPOSED_HOLLOW * thickest_mm.len() as f64) as usize].max(THINNEST_MM)
+    }
+
+    /// Longest edge at which half of the surface would have a cavity below walls of `wall_mm`, mm. Walls are
+    /// tried in steps, so the size is a step too small.
+    fn size_mm(&self, model: &Solid, wall_mm: f64) -> f64 {
+        let longest_mm = model.mesh().bounds().size().max_element();
+        longest_mm * STEP * wall_mm / self.median_mm(model)
+    }
 }
 
 /// Thickest wall with a cavity below, mm, at points spread over the surface.
@@ -140,6 +166,14 @@ mod tests {
     use shellock_testkit::shapes::brick;
 
     use super::*;
+
+    fn is_hollow(model: &Solid, wall_mm: f64) -> Result<(), TooThin> {
+        Cavity::default().is_hollow(model, wall_mm)
+    }
+
+    fn has_room(model: &Solid, wall_mm: f64) -> Result<(), NoRoom> {
+        Cavity::default().has_room(model, wall_mm)
+    }
 
     fn plate(thick_mm: f64) -> Solid {
         Solid::new(brick([0.0, 100.0], [0.0, 80.0], [0.0, thick_mm]).to_mesh()).unwrap()

@@ -4,7 +4,7 @@ use shellock_geom::Solid;
 use shellock_mechanics::ShellError;
 use shellock_report::Ctx;
 
-use super::{Strength, StrengthError, StrengthParams, has_room, is_hollow, stress, thickness};
+use super::{Cavity, Strength, StrengthError, StrengthParams, stress, thickness};
 
 /// Computes the stress of a wall of `given_mm`, or seeks the least thickness that withstands a fall. Returns
 /// the error of the analysis where the equations cannot be solved: a kit can be made all the same.
@@ -16,13 +16,14 @@ pub fn decide(
     ctx: &Ctx<'_>,
     params: &StrengthParams,
     model: &Solid,
+    cavity: &Cavity,
     given_mm: Option<f64>,
     allows_thin: bool,
 ) -> Result<Result<Strength, ShellError>, StrengthError> {
     if !allows_thin {
         let thinnest_mm = given_mm.unwrap_or(params.thin_mm);
-        is_hollow(model, thinnest_mm)?;
-        has_room(model, thinnest_mm)?;
+        cavity.is_hollow(model, thinnest_mm)?;
+        cavity.has_room(model, thinnest_mm)?;
     }
     let found = match given_mm {
         Some(mm) => stress(ctx, params, model, mm),
@@ -31,7 +32,7 @@ pub fn decide(
     match found {
         Ok(strength) => {
             if !allows_thin {
-                is_hollow(model, strength.thickness_mm)?;
+                cavity.is_hollow(model, strength.thickness_mm)?;
             }
             Ok(Ok(strength))
         }

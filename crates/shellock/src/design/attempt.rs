@@ -149,6 +149,7 @@ fn plan_or_changes<T>(
     let edge_share = MetricParams::default().edge_share;
     let planning = Planning {
         input: job.input,
+        cavity: &job.wall.cavity,
         turn: &setup.candidate.turn,
         division,
         even: setup

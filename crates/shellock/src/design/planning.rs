@@ -8,10 +8,13 @@ use crate::handling::Handling;
 use crate::key::Turn;
 use crate::metric::{Choice, ClimbParams, EvenSurface};
 use crate::plan::{LatticePlan, PlanConstraints, PlanSurvey};
+use crate::strength::Cavity;
 
 /// Input of the search for a plan.
 pub(super) struct Planning<'a> {
     pub input: Input<'a>,
+    /// Estimates of the model's cavity.
+    pub cavity: &'a Cavity,
     /// Turn of the model for the division.
     pub turn: &'a Turn,
     pub division: &'a Division,

@@ -13,7 +13,7 @@ use super::wall::Thicker;
 use crate::handling::Handling;
 use crate::metric::{ChoiceError, LoadBorne, WhatIf, is_worth, weakest_use};
 use crate::plan::RankedPlan;
-use crate::{Ctx, PatchId, Warning, segmentation, strength};
+use crate::{Ctx, PatchId, Warning, segmentation};
 
 /// Share of the load factor that is asked for, below which changes are sought: what is missing is less than
 /// what the model knows.
@@ -61,7 +61,7 @@ pub(super) fn strengthen(
     let wall = allowance.permit(Step::Thicken);
     if wall != Permit::No {
         let input = planning.input;
-        let is_hollow = |mm| input.params.allows_thin || strength::is_hollow(input.model, mm).is_ok();
+        let is_hollow = |mm| input.params.allows_thin || planning.cavity.is_hollow(input.model, mm).is_ok();
         let most_mm = division.settings.strength.most_mm;
         let thicker = rating.thicken(&sizes.sizes, borne, most_mm, is_hollow);
         match (thicker.map_err(ChoiceError::from)?, wall) {
@@ -118,6 +118,7 @@ mod tests {
     use crate::handling::{Deed, Failure};
     use crate::metric::{EvenSurface, GivesWay};
     use crate::plan::{LatticePlan, PlanConstraints, PlanScore, survey};
+    use crate::strength::Cavity;
 
     const N: usize = 4;
 
@@ -165,6 +166,7 @@ mod tests {
         let planning = Planning {
             even: &even,
             input: ball.input(),
+            cavity: &Cavity::default(),
             turn: &candidate.turn,
             division: &division,
             survey: &survey,

@@ -1,9 +1,11 @@
 //! The wall of a kit: as thick as a fall asks for, thicker for the sake of use, or as thin as walls are made.
 
+use std::sync::Arc;
+
 use super::causes::Cause;
 use super::ways::{Input, Way};
 use super::{DesignError, Params, Settings, Thickness};
-use crate::strength::{self, Strength, StrengthError};
+use crate::strength::{self, Cavity, Strength, StrengthError};
 use crate::{Ctx, Warning};
 
 /// Thickness of the wall in the stages' settings, and the facts that led to it.
@@ -13,6 +15,8 @@ pub(super) struct Wall {
     pub strength: Option<Strength>,
     /// Error of the stress analysis, if it could not be done.
     pub error: Option<String>,
+    /// Estimates of the model's cavity.
+    pub cavity: Arc<Cavity>,
     /// True if the thickness is ours to choose.
     is_free: bool,
     /// True if the model is not divided by the method that was asked for.
@@ -36,6 +40,7 @@ impl Wall {
             settings: Settings::resolve(params),
             strength: None,
             error: None,
+            cavity: Arc::default(),
             is_free: params.thickness == Thickness::Auto,
             is_divided_otherwise: false,
             thicker: None,
@@ -44,27 +49,31 @@ impl Wall {
 
     /// Decides the thickness by the stress in a fall. Fails if the model is too thin for hollow pieces and
     /// connectors, unless the user allows that.
-    pub fn decide(ctx: &Ctx, &Input { params, model, .. }: &Input<'_>) -> Result<Self, DesignError> {
-        let nominal = Self::nominal(params);
+    pub fn decide(ctx: &Ctx, input: &Input<'_>) -> Result<Self, DesignError> {
+        Self::nominal(input.params).with_strength(ctx, input)
+    }
+
+    /// Decides the thickness of this nominal wall.
+    fn with_strength(self, ctx: &Ctx, &Input { params, model, .. }: &Input<'_>) -> Result<Self, DesignError> {
         let given_mm = match params.thickness {
             Thickness::Mm(mm) => Some(mm),
             Thickness::Auto => None,
         };
-        let limits = &nominal.settings.strength;
+        let (limits, cavity) = (&self.settings.strength, &self.cavity);
         Ok(
-            match strength::decide(&ctx.fork(), limits, model, given_mm, params.allows_thin)? {
+            match strength::decide(&ctx.fork(), limits, model, cavity, given_mm, params.allows_thin)? {
                 Ok(strength) => {
                     let mut settings = Settings::with_thickness(params, strength.thickness_mm);
                     settings.strength.most_mm = strength.most_mm;
                     Self {
                         settings,
                         strength: Some(strength),
-                        ..nominal
+                        ..self
                     }
                 }
                 Err(error) => Self {
                     error: Some(StrengthError::from(error).to_string()),
-                    ..nominal
+                    ..self
                 },
             },
         )
@@ -109,11 +118,12 @@ impl Wall {
         let mut params = input.params.clone();
         params.thickness = Thickness::Mm(mm);
         let params = &params;
-        let wall = Self::decide(ctx, &Input { params, ..*input })?;
-        Ok(Self {
+        let nominal = Self {
             is_free: self.is_free,
-            ..wall
-        })
+            cavity: self.cavity.clone(),
+            ..Self::nominal(params)
+        };
+        nominal.with_strength(ctx, &Input { params, ..*input })
     }
 
     /// Warnings that follow from the facts.

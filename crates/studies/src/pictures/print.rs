@@ -4,16 +4,13 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::booklet::Booklet;
-use shellock_print::plates::{Printable, lay};
+use shellock_print::plates::{Printable, Skin, lay};
 use shellock_render::stills::{Camera, Painted, render};
 
 use super::draw::{PALE, plain};
 use super::kit::Kit;
 use super::sheet::{DENSITY, Sheet, WIDTH, hex, pixels};
 
-/// Distance from the model's surface, mm, within which a face's centre makes it skin, as for the kit's
-/// plates.
-const SKIN_MM: f64 = 0.05;
 /// Thickness of the drawn plate, mm.
 const BED_MM: f64 = 2.0;
 
@@ -21,13 +18,13 @@ const BED_MM: f64 = 2.0;
 pub fn plates(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 320.0];
     let skin = TriangleBvh::new(kit.model.mesh());
-    let is_outer = |mesh: &TriMesh, f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
     let printables: Vec<Printable<'_>> = kit
         .meshes
         .iter()
         .map(|mesh| Printable {
             mesh,
-            is_outer: (0..mesh.triangles.len()).map(|f| is_outer(mesh, f)).collect(),
+            simple: mesh,
+            skin: Skin::On(&skin),
         })
         .collect();
     let mut cells = Vec::new();
