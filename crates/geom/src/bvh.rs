@@ -40,6 +40,8 @@ pub struct TriangleBvh {
     pub(crate) corners: Vec<[Vec3; 3]>,
     pub(crate) faces: Vec<u32>,
     groups: Vec<u32>,
+    /// Groups below each node, as bits; empty if there is one group, or more than bits.
+    groups_below: Vec<u128>,
 }
 
 /// Part of a triangle on which its nearest point lies.
@@ -84,10 +86,13 @@ impl TriangleBvh {
             group_of_face,
         };
         let mut order: Vec<u32> = (0..n).collect();
+        let nodes = builder.tree(&mut order, 0, 0);
+        let groups: Vec<u32> = order.iter().map(|&f| builder.group(f)).collect();
         Self {
-            nodes: builder.tree(&mut order, 0, 0),
+            groups_below: groups_below(&nodes, &groups),
+            nodes,
             corners: order.par_iter().map(|&f| corners(f)).collect(),
-            groups: order.iter().map(|&f| builder.group(f)).collect(),
+            groups,
             faces: order,
         }
     }
@@ -146,13 +151,11 @@ impl TriangleBvh {
             top -= 1;
             let (at, near) = stack[top];
             let node = &self.nodes[at as usize];
-            if near
-                > if node.group == MIXED {
-                    limit_sq
-                } else {
-                    known(found, node.group)
-                }
-            {
+            let worth_sq = match node.group {
+                MIXED => self.farthest_below(at, found).unwrap_or(limit_sq),
+                group => known(found, group),
+            };
+            if near > worth_sq {
                 continue;
             }
             if node.count > 0 {
@@ -179,10 +182,25 @@ impl TriangleBvh {
         found.sort_unstable_by_key(|e| e.0);
     }
 
+    /// Greatest squared distance known of the groups below a node, mm²; `None` if one has none yet.
+    fn farthest_below(&self, node: u32, found: &[(u32, f64)]) -> Option<f64> {
+        let mut unknown = *self.groups_below.get(node as usize)?;
+        let mut farthest_sq = 0.0f64;
+        for &(group, distance_sq) in found {
+            let bit = 1 << group;
+            if unknown & bit != 0 {
+                unknown &= !bit;
+                farthest_sq = farthest_sq.max(distance_sq);
+            }
+        }
+        (unknown == 0).then_some(farthest_sq)
+    }
+
     /// First triangle that a ray meets within `limit_mm`, and the distance to it, mm. The ray starts at
     /// `origin` and follows the unit vector `direction`. Both sides of triangles count; triangles parallel to
     /// the ray do not.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3, limit_mm: f64) -> Option<(u32, f64)> {
+        let ray = Ray::new(origin, direction);
         let mut best: Option<(u32, f64)> = None;
         let mut limit = limit_mm;
         let mut stack = [0u32; 64];
@@ -190,7 +208,7 @@ impl TriangleBvh {
         while top > 0 {
             top -= 1;
             let node = &self.nodes[stack[top] as usize];
-            if !ray_meets_box(node.bounds, origin, direction, limit) {
+            if !ray.meets(node.bounds, limit) {
                 continue;
             }
             if node.count == 0 {
@@ -212,23 +230,63 @@ impl TriangleBvh {
     }
 }
 
-fn ray_meets_box(b: Aabb, origin: Vec3, direction: Vec3, limit: f64) -> bool {
-    let (mut from, mut to) = (0.0f64, limit);
-    for axis in 0..3 {
-        if direction[axis] == 0.0 {
-            if origin[axis] < b.min[axis] || origin[axis] > b.max[axis] {
-                return false;
-            }
-            continue;
-        }
-        let (p, q) = (
-            (b.min[axis] - origin[axis]) / direction[axis],
-            (b.max[axis] - origin[axis]) / direction[axis],
-        );
-        (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
+/// Groups below each node, as bits; empty if there is one group, or more than bits. Children come after their
+/// parents.
+fn groups_below(nodes: &[Node], groups: &[u32]) -> Vec<u128> {
+    let is_mixed = nodes.first().is_some_and(|root| root.group == MIXED);
+    if !is_mixed || groups.iter().any(|&group| group >= u128::BITS) {
+        return Vec::new();
     }
-    // The slack covers rounding of the divisions, so that a flat box is not missed.
-    from <= to + 1e-9 * (1.0 + to.abs())
+    let mut below = vec![0; nodes.len()];
+    for (at, node) in nodes.iter().enumerate().rev() {
+        below[at] = if node.count > 0 {
+            node.triangles().fold(0, |bits, i| bits | 1 << groups[i])
+        } else {
+            below[node.first as usize] | below[node.first as usize + 1]
+        };
+    }
+    below
+}
+
+/// A ray, prepared for tests against many boxes.
+struct Ray {
+    origin: Vec3,
+    /// Reciprocals of the direction's components; 0 for an axis that it is perpendicular to.
+    inverse: Vec3,
+    /// True for axes that the direction is perpendicular to.
+    is_across: [bool; 3],
+}
+
+impl Ray {
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        let is_across = direction.to_array().map(|d| d == 0.0);
+        let inverse = direction.to_array().map(|d| if d == 0.0 { 0.0 } else { 1.0 / d });
+        Self {
+            origin,
+            inverse: Vec3::from_array(inverse),
+            is_across,
+        }
+    }
+
+    /// Returns true if the ray meets a box within `limit` mm.
+    fn meets(&self, b: Aabb, limit: f64) -> bool {
+        let (mut p, mut q) = (
+            (b.min - self.origin) * self.inverse,
+            (b.max - self.origin) * self.inverse,
+        );
+        for axis in 0..3 {
+            if self.is_across[axis] {
+                if self.origin[axis] < b.min[axis] || self.origin[axis] > b.max[axis] {
+                    return false;
+                }
+                (p[axis], q[axis]) = (0.0, limit);
+            }
+        }
+        let from = p.min(q).max_element().max(0.0);
+        let to = p.max(q).min_element().min(limit);
+        // The slack covers rounding of the products, so that a flat box is not missed.
+        from <= to + 1e-9 * (1.0 + to.abs())
+    }
 }
 
 /// Distance along the ray, ≥ 0; `None` if the ray misses the triangle. [MollerTrumbore1997]

@@ -202,7 +202,10 @@ fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Face
         .map_or_else(|| Cow::Owned(crease_normals(painted.mesh)), Cow::Borrowed);
     let mesh = u16::try_from(mesh + 1).expect("a picture has fewer than 65 000 meshes");
     let in_view = |n: Vec3| view.axes.map(|a| a.dot(n) as f32);
-    let (triangles, plain) = (&painted.mesh.triangles, painted.color.map(canvas::linear_from_srgb));
+    let (triangles, plain) = (
+        &painted.mesh.triangles,
+        painted.color.map(canvas::linear_from_srgb),
+    );
     (triangles, &normals[..])
         .into_par_iter()
         .enumerate()
