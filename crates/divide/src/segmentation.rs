@@ -45,6 +45,7 @@ use shellock_report::{Ctx, PatchId};
 use shellock_segment::mirrored::Mirrored;
 use shellock_surface::SegmentedSurface;
 pub use smooth::smooth_and_cut;
+use split::split_between_regions;
 pub use split::split_piece;
 pub use user::user_labels;
 
@@ -292,9 +293,10 @@ fn propose(
     let Some(drawn) = automatic_on(ctx, params, ground.solid, &ground.whole)? else {
         return try_clusterings(ctx, params, ground);
     };
-    let wanted = params
-        .n_pieces
-        .unwrap_or_else(|| usual_n_pieces(ground.solid.mesh().area()));
+    let (drawn, wanted) = match params.n_pieces {
+        Some(n) => (divide_largest(ctx, params, ground, drawn, n)?, n),
+        None => (drawn, usual_n_pieces(ground.solid.mesh().area())),
+    };
     let mirrored = mirror_images(params, ground);
     let origin = LabelOrigin::Drawn {
         labels: &drawn,
@@ -313,6 +315,42 @@ fn propose(
         return try_clusterings(ctx, params, ground);
     }
     Ok(drawn)
+}
+
+/// Divides the largest patch until there are `wanted` ones. People cut a figure into twenty parts at most, so
+/// more pieces are halves of these.
+fn divide_largest(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+    mut labels: FaceLabels,
+    wanted: usize,
+) -> Result<FaceLabels, SegmentationError> {
+    /// Least area of a patch that is divided, in smallest patches.
+    const LEAST_TO_DIVIDE: f64 = 3.0;
+    let mut is_divisible = vec![true; labels.n_patches()];
+    while labels.n_patches() < wanted {
+        ctx.check()?;
+        let mut area_mm2 = vec![0.0; labels.n_patches()];
+        for (face, &patch) in labels.as_slice().iter().enumerate() {
+            area_mm2[patch as usize] += ground.faces.area[face];
+        }
+        let is_large = |&i: &usize| is_divisible[i] && area_mm2[i] > LEAST_TO_DIVIDE * params.min_piece_mm2;
+        let largest = (0..area_mm2.len())
+            .filter(is_large)
+            .max_by(|&i, &j| area_mm2[i].total_cmp(&area_mm2[j]));
+        let Some(largest) = largest else {
+            break;
+        };
+        match split_between_regions(ground, &labels, PatchId(largest as u32)) {
+            Some(divided) => {
+                labels = divided;
+                is_divisible.push(true);
+            }
+            None => is_divisible[largest] = false,
+        }
+    }
+    Ok(labels)
 }
 
 /// Origin of the patches that are changed. A user wants to recognise the labels; an automatic choice should
@@ -449,7 +487,7 @@ pub fn divide(
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     try_change(ctx, params, surface, |solid, labels| {
-        split::split_between_regions(
+        split_between_regions(
             &Ground::with_regions(params, solid, &surface.source_face),
             labels,
             patch,

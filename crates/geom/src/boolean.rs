@@ -14,7 +14,7 @@ use manifold_rust::polygon;
 use manifold_rust::types::{Error, MeshGL64, OpType, WindingRule};
 
 use crate::topology::{Topology, components};
-use crate::{Aabb, Solid, TriMesh, Vec3};
+use crate::{Aabb, Solid, TriMesh, Vec3, work};
 
 /// Region bounded by a manifold mesh. May be empty, have several bodies, and have cavities.
 #[derive(Clone)]
@@ -43,6 +43,12 @@ pub(crate) fn cut_by_ears(corners: &[[f64; 2]]) -> Vec<[u32; 3]> {
         .collect()
 }
 
+/// Counts a boolean operation on these volumes.
+fn count_boolean<'a>(operands: impl IntoIterator<Item = &'a Volume>) {
+    work::BOOLEANS.add(1);
+    work::BOOLEAN_TRIANGLES.add(operands.into_iter().map(Volume::n_triangles).sum());
+}
+
 impl Volume {
     /// Creates the region that contains nothing.
     pub fn empty() -> Self {
@@ -61,6 +67,7 @@ impl Volume {
         if mesh.triangles.is_empty() {
             return Ok(Self::empty());
         }
+        work::VOLUME_TRIANGLES.add(mesh.triangles.len());
         let made = Manifold::from_mesh_gl64(&as_gl(mesh));
         match made.status() {
             Error::NoError => Ok(Self(made)),
@@ -73,6 +80,7 @@ impl Volume {
     /// Convex hull of `points`; empty if they lie in a plane.
     pub fn hull(points: &[Vec3]) -> Self {
         let points: Vec<V> = points.iter().map(|&p| v(p)).collect();
+        work::HULLS.add(1);
         let hull = Manifold::hull(&points);
         if hull.status() == Error::NoError && hull.volume() > 0.0 {
             Self(hull)
@@ -146,6 +154,7 @@ impl Volume {
             0 => Self::empty(),
             1 => parts.remove(0),
             _ => {
+                count_boolean(parts.iter());
                 let leaves = parts
                     .into_iter()
                     .map(|p| CsgNode::leaf(p.0.into_impl()))
@@ -160,7 +169,10 @@ impl Volume {
         match (self.is_empty(), other.is_empty()) {
             (true, _) => other.clone(),
             (_, true) => self.clone(),
-            _ => Self(self.0.union(&other.0)),
+            _ => {
+                count_boolean([self, other]);
+                Self(self.0.union(&other.0))
+            }
         }
     }
 
@@ -169,6 +181,7 @@ impl Volume {
         if !self.boxes_meet(other) {
             return Self::empty();
         }
+        count_boolean([self, other]);
         Self(self.0.intersection(&other.0))
     }
 
@@ -177,6 +190,7 @@ impl Volume {
         if !self.boxes_meet(other) {
             return self.clone();
         }
+        count_boolean([self, other]);
         Self(self.0.difference(&other.0))
     }
 
@@ -185,6 +199,7 @@ impl Volume {
         if !self.boxes_meet(cutter) {
             return (Self::empty(), self.clone());
         }
+        count_boolean([self, cutter]);
         let (inside, outside) = self.0.split(&cutter.0);
         (Self(inside), Self(outside))
     }

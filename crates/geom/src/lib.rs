@@ -32,6 +32,7 @@ pub mod sweep;
 pub mod thin;
 pub mod topology;
 pub mod weld;
+pub mod work;
 
 pub use band::Band;
 pub use boolean::Volume;

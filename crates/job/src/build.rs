@@ -123,16 +123,11 @@ impl<'a> Begun<'a> {
             DesignOutcome::NoPlan(none) => return Err(no_plan(&none)),
         };
         let mut notes = self.notes;
-        if let Some(asked) = self
-            .params
-            .n_pieces
-            .filter(|asked| design.kit.pieces.len() > asked + 1)
-        {
-            notes.push(format!(
-                "{} pieces instead of {asked}: some were divided further so that every piece locks",
-                design.kit.pieces.len()
-            ));
-        }
+        notes.extend(
+            self.params
+                .n_pieces
+                .and_then(|asked| other_number(asked, &design)),
+        );
         show(Progress::Stage {
             name: "files and pictures",
             n_steps: 0,
@@ -198,6 +193,32 @@ fn with_limits<T>(
         .with_time_limit(&is_time_up)
         .with_deadline(&seconds_left);
     work(&ctx)
+}
+
+/// Says why a kit has more or fewer pieces than were asked for; `None` if it has about as many.
+fn other_number(asked: usize, design: &Design) -> Option<String> {
+    /// Share of the number asked for by which a kit may miss it without a word.
+    const ABOUT: f64 = 0.1;
+    let made = design.kit.pieces.len();
+    if made > asked + 1 {
+        return Some(format!(
+            "{made} pieces instead of {asked}: some were divided further so that every piece locks"
+        ));
+    }
+    if made as f64 >= (1.0 - ABOUT) * asked as f64 - 1.0 {
+        return None;
+    }
+    let has_joined = |words: &str| design.effort.steps.iter().any(|step| step.contains(words));
+    let why = if has_joined("rattle") {
+        "pieces were joined that would rattle"
+    } else if has_joined("part under") {
+        "pieces were joined that would part under a load"
+    } else {
+        "smaller ones have too short seams for connectors"
+    };
+    Some(format!(
+        "{made} pieces instead of {asked}: {why}; a larger model has room for more (--size)"
+    ))
 }
 
 /// Reason why there is no kit, in words.

@@ -47,6 +47,7 @@ mod summary;
 mod tabs;
 pub mod told;
 mod upright;
+pub mod work;
 
 pub use bears::lines as bears_lines;
 pub use failure::Failure;

@@ -47,6 +47,7 @@ use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 pub use load::{Bearing, Closed, Drift, JoinedParts};
 use parts::{N_MOTIONS, Part, parts};
 use solve::Layout;
+pub use solve::SOLVES;
 
 /// Stiffness, force and solver parameters of the shell. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -25,6 +25,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sequence::{Sequence, sequence};
+use shellock_geom::work::Count;
 use shellock_report::{Cancelled, Ctx, PatchId};
 
 use super::draw::Draws;
@@ -35,6 +36,9 @@ use super::pool::Pool;
 use super::score::{just_above, just_below};
 use super::space::Space;
 use super::{LatticePlan, PieceSet};
+
+/// Domains that proofs revised.
+pub static REVISIONS: Count = Count::new("proof_revisions");
 
 /// Relative step of cost between two thresholds, below which bisection stops and each question gets more
 /// work.
@@ -266,6 +270,7 @@ fn ask(
         is_time_up: false,
     };
     let answer = probe.proof();
+    REVISIONS.add(probe.propagator.n_revisions);
     budget.n_left = budget.n_left.saturating_sub(probe.propagator.n_revisions.max(1));
     if probe.is_time_up {
         budget.n_left = 0;

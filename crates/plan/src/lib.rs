@@ -39,6 +39,7 @@ mod survey;
 pub mod types;
 
 pub use causes::{Cause, SizeLimit};
+pub use exact::REVISIONS;
 pub use handover::Handover;
 pub use local_cost::{PieceCosts, SeamCosts};
 pub use neighbours::{Neighbourhood, PlanName};

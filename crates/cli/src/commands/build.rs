@@ -12,6 +12,7 @@ use shellock_job::output::Destination;
 use shellock_job::place::Standing;
 use shellock_job::shape::shape_warnings;
 use shellock_job::stopwatch::StageTime;
+use shellock_job::work;
 use shellock_job::{Failure, Options};
 
 use crate::Session;
@@ -121,7 +122,7 @@ fn print_json(to: &Destination, made: &Made, stages: &[StageTime], code: u8) {
         "key_slides_on_rails_mm": kit.rails_mm(),
         "bears": kit.holding.summary(),
         "checks": kit.verification.checks, "findings": kit.verification.findings,
-        "effort": made.design.effort, "stages": stages,
+        "effort": made.design.effort, "stages": stages, "work": work::counts(),
         "warnings": made.warnings, "exit_code": code,
     });
     println!("{value}");

@@ -10,12 +10,16 @@ use std::sync::Arc;
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::{SparseError, eliminate_first};
+use shellock_geom::work::Count;
 
 use super::contact::{ContactSpring, Law, N_CONTACTS, contacts_at, forces, gap};
 use super::join::{ContactBody, Joinings, Reduced};
 use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceParams, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Side, Station};
+
+/// Loads that were solved for joined parts.
+pub static SOLVES: Count = Count::new("load_solves");
 
 /// Newton steps of a line search. The slope is piecewise linear, and most searches end after two or three.
 const LINE_STEPS: usize = 30;
@@ -179,6 +183,7 @@ impl<'a> Jointed<'a> {
     /// contacts that only push start by the sign of their gap, which takes three steps fewer than starting
     /// with all closed.
     pub fn balance(&self, load: &Load, closed: Option<&[bool]>) -> Result<Balance, SparseError> {
+        SOLVES.add(1);
         let Self {
             model,
             layout: Layout { is_held, .. },

@@ -58,6 +58,22 @@ impl Default for ClimbParams {
     }
 }
 
+impl ClimbParams {
+    /// Returns the limits for plans of `n_pieces` pieces. A load takes about as long as there are pieces, so
+    /// fewer are solved of many pieces, and the climb takes no longer.
+    fn for_pieces(self, n_pieces: usize) -> Self {
+        /// Greatest number of pieces for which all loads are solved.
+        const USUAL: usize = 20;
+        let n = |n_solves: usize| n_solves * USUAL / n_pieces.max(USUAL);
+        Self {
+            n_of_use: n(self.n_of_use),
+            n_of_pull: n(self.n_of_pull),
+            n_of_falls: n(self.n_of_falls),
+            ..self
+        }
+    }
+}
+
 /// Result of a climb.
 pub struct Climbed<'a> {
     /// The strongest plan found.
@@ -121,7 +137,8 @@ impl<'c, 'b> Ascent<'c, 'b> {
         bench: &'b Bench<'b>,
         starts: &[RankedPlan],
     ) -> Result<Self, ClimbError> {
-        let limits = rules.params;
+        let n_pieces = starts.first().map_or(0, |start| start.plan.steps.len());
+        let limits = rules.params.for_pieces(n_pieces);
         let mut climber = Climber {
             ctx,
             bench,
