@@ -35,7 +35,7 @@ impl Count {
 pub static BOOLEANS: Count = Count::new("booleans");
 /// Triangles of their operands.
 pub static BOOLEAN_TRIANGLES: Count = Count::new("boolean_triangles");
-/// Convex hulls.
+/// Convex hulls of points.
 pub static HULLS: Count = Count::new("hulls");
 /// Triangles of meshes that became volumes.
 pub static VOLUME_TRIANGLES: Count = Count::new("volume_triangles");

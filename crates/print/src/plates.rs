@@ -40,9 +40,9 @@ pub struct Printable<'a> {
 /// Part of a piece's surface that is visible on the assembled model.
 #[derive(Clone, Copy)]
 pub enum Skin<'a> {
-    /// No part of it.
+    /// No part of the surface.
     None,
-    /// All of it.
+    /// All of the surface.
     All,
     /// Faces that lie on the surface of the model.
     On(&'a TriangleBvh),

@@ -46,20 +46,42 @@ pub struct EffortOptions {
 }
 
 /// Result of one job.
-struct Run {
-    name: String,
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// Name of the model, with its size.
+    pub name: String,
     /// Exit code; `None` if the job was stopped for its time or by a signal.
-    exit_code: Option<i32>,
-    seconds: f64,
-    cpu_seconds: f64,
-    peak_mb: f64,
+    pub exit_code: Option<i32>,
+    /// Wall-clock time of the job, s.
+    pub seconds: f64,
+    /// Processor time of all stages, s.
+    pub cpu_seconds: f64,
+    /// Peak memory of the program, MB.
+    pub peak_mb: f64,
     /// Processor seconds of each stage, largest first.
-    stages: Vec<(String, f64)>,
-    kits: Option<u64>,
+    pub stages: Vec<(String, f64)>,
+    /// Number of kits made.
+    pub kits: Option<u64>,
     /// Outcome in words: status, failed checks, or error.
-    last: String,
+    pub last: String,
     /// Notes of the program, such as why kits and divisions were rejected.
-    notes: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+/// A program that makes kits, and the folders of what it says and makes.
+pub struct Job<'a> {
+    /// Program that is run.
+    pub program: &'a Path,
+    /// Folder of the program's answers and events.
+    pub folder: &'a Path,
+    /// Folder of the kits.
+    pub kits: &'a Path,
+    /// True if kits are not deleted.
+    pub keeps_kit: bool,
+    /// Seconds after which a job is given up.
+    pub most_seconds: u64,
+    /// Further options of `build`.
+    pub options: &'a [String],
 }
 
 /// Runs all jobs; returns the file of the table.
@@ -85,7 +107,15 @@ pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure>
     let runs: Result<Vec<Run>, Failure> = pool.install(|| {
         jobs.par_iter()
             .map(|(model, size_mm)| {
-                let run = one(options, &folder, model, *size_mm)?;
+                let job = Job {
+                    program: &options.program,
+                    folder: &folder,
+                    kits: options.keep.as_deref().unwrap_or(&folder),
+                    keeps_kit: options.keep.is_some(),
+                    most_seconds: options.most_seconds,
+                    options: &options.options,
+                };
+                let run = job.run(model, *size_mm)?;
                 let _one_at_a_time = said.lock().expect("no holder of this lock panics");
                 println!("{}", line(&run).join(" | "));
                 Ok(run)
@@ -134,55 +164,58 @@ fn write_family(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         .collect()
 }
 
-/// Runs one job and watches it until it ends or its time is up.
-fn one(options: &EffortOptions, folder: &Path, model: &Path, size_mm: f64) -> Result<Run, Failure> {
-    let stem = model
-        .file_stem()
-        .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let name = format!("{stem}-{size_mm}");
-    let kit = options.keep.as_deref().unwrap_or(folder).join(&name);
-    let wrong = |source| Failure::File {
-        path: options.program.clone(),
-        source,
-    };
-    let [out, err] = ["json", "events"].map(|ending| folder.join(format!("{name}.{ending}")));
-    fs::create_dir_all(folder).map_err(wrong)?;
-    let since = Instant::now();
-    let mut child = Command::new(&options.program)
-        .args(["--json", "build", "--force", "--size", &size_mm.to_string(), "-o"])
-        .arg(&kit)
-        .arg(model)
-        .args(&options.options)
-        .stdin(Stdio::null())
-        .stdout(fs::File::create(&out).map_err(wrong)?)
-        .stderr(fs::File::create(&err).map_err(wrong)?)
-        .spawn()
-        .map_err(wrong)?;
-    let mut peak_mb = 0.0f64;
-    let ended = loop {
-        if let Some(status) = child.try_wait().map_err(wrong)? {
-            break status.code();
+impl Job<'_> {
+    /// Runs the program on a model and watches it until it ends or its time is up.
+    pub fn run(&self, model: &Path, size_mm: f64) -> Result<Run, Failure> {
+        let folder = self.folder;
+        let stem = model
+            .file_stem()
+            .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        let name = format!("{stem}-{size_mm}");
+        let kit = self.kits.join(&name);
+        let wrong = |source| Failure::File {
+            path: self.program.to_owned(),
+            source,
+        };
+        let [out, err] = ["json", "events"].map(|ending| folder.join(format!("{name}.{ending}")));
+        fs::create_dir_all(folder).map_err(wrong)?;
+        let since = Instant::now();
+        let mut child = Command::new(self.program)
+            .args(["--json", "build", "--force", "--size", &size_mm.to_string(), "-o"])
+            .arg(&kit)
+            .arg(model)
+            .args(self.options)
+            .stdin(Stdio::null())
+            .stdout(fs::File::create(&out).map_err(wrong)?)
+            .stderr(fs::File::create(&err).map_err(wrong)?)
+            .spawn()
+            .map_err(wrong)?;
+        let mut peak_mb = 0.0f64;
+        let ended = loop {
+            if let Some(status) = child.try_wait().map_err(wrong)? {
+                break status.code();
+            }
+            if since.elapsed() > Duration::from_secs(self.most_seconds) {
+                let _ = child.kill();
+                let _ = child.wait();
+                break None;
+            }
+            peak_mb = peak_mb.max(resident_mb(child.id()));
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let seconds = since.elapsed().as_secs_f64();
+        if !self.keeps_kit {
+            let _ = fs::remove_dir_all(&kit);
         }
-        if since.elapsed() > Duration::from_secs(options.most_seconds) {
-            let _ = child.kill();
-            let _ = child.wait();
-            break None;
-        }
-        peak_mb = peak_mb.max(resident_mb(child.id()));
-        std::thread::sleep(Duration::from_millis(20));
-    };
-    let seconds = since.elapsed().as_secs_f64();
-    if options.keep.is_none() {
-        let _ = fs::remove_dir_all(&kit);
+        let (answer, events) = (read(&out), read(&err));
+        Ok(Run {
+            name,
+            exit_code: ended,
+            seconds,
+            peak_mb,
+            ..read_run(&answer, &events)
+        })
     }
-    let (answer, events) = (read(&out), read(&err));
-    Ok(Run {
-        name,
-        exit_code: ended,
-        seconds,
-        peak_mb,
-        ..read_run(&answer, &events)
-    })
 }
 
 fn read(path: &Path) -> String {

@@ -20,6 +20,7 @@ mod savings;
 mod search;
 mod segmentations;
 mod sheet;
+mod speed;
 mod statistics;
 mod strength;
 mod study;

@@ -16,6 +16,7 @@ use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
 use crate::segmentations::{self, SegmentationsOptions};
 use crate::sheet::{Sheet, write_all};
+use crate::speed::{self, SpeedOptions};
 use crate::statistics::band;
 use crate::strength::{self, StrengthOptions};
 use crate::table::Table;
@@ -47,6 +48,8 @@ enum Study {
     Strength(StrengthOptions),
     /// Effort for kits of many models: time by stage, kits made in vain
     Effort(EffortOptions),
+    /// Processor time by stage of two programs, in alternation
+    Speed(SpeedOptions),
     /// Agreement of print time and plastic by closed forms with PrusaSlicer's, on kits or on their pieces
     Hours(HoursOptions),
     /// Agreement of metrics: CSV with a column of scores for each metric, "name" or "name [unit]", and a row
@@ -79,6 +82,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
         Study::Segmentations(segmentations) => segmentations::run(segmentations, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Effort(effort) => effort::run(effort, &options.out),
+        Study::Speed(speed) => speed::run(speed, &options.out),
         Study::Hours(hours) => hours::run(hours, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {
