@@ -358,6 +358,23 @@ fn of_a_limbed_body_few_enough_pieces_come_and_none_holds_others_alone() {
     assert_eq!(graph.n_faults(), 0);
 }
 
+#[test]
+fn as_many_pieces_come_as_are_asked_for_even_of_a_body_with_few_limbs() {
+    let solid = sphere_with_arms();
+    for asked in [12, 20] {
+        let params = SegmentationParams {
+            method: Method::Auto,
+            n_pieces: Some(asked),
+            ..SegmentationParams::default()
+        };
+        let surface = with_ctx(|ctx| segment(ctx, &params, &solid, None)).unwrap();
+        let share = surface.n_patches as f64 / asked as f64;
+        assert!((0.9..=1.3).contains(&share), "{} of {asked}", surface.n_patches);
+        let graph = surface.contact_graph_below(params.wall_mm, params.least_contact_mm);
+        assert_eq!(graph.n_faults(), 0);
+    }
+}
+
 fn ball(center_mm: [f64; 3], radius_mm: f64) -> KeepWhole {
     KeepWhole::Sphere { center_mm, radius_mm }
 }
