@@ -9,7 +9,8 @@ use crate::problem::Problem;
 use crate::{cargo, words};
 
 /// Crates with fast unit tests: 0.01 to 7 s each on one core, 30 s in all. Those of `shellock` take 80 s.
-const FAST: [&str; 18] = [
+/// `shellock-python` gives dependencies the features of the whole workspace: nothing is compiled twice.
+const FAST: [&str; 19] = [
     "shellock-report",
     "shellock-geom",
     "shellock-formats",
@@ -27,6 +28,7 @@ const FAST: [&str; 18] = [
     "shellock-cli",
     "shellock-check",
     "shellock-testkit",
+    "shellock-python",
     "xtask",
 ];
 /// Tests beside unit tests that are fast, too: the order of crates and modules, and the guide of options.
