@@ -205,7 +205,12 @@ const act = {
     judge();
   }),
   divide: guarded(async () => { await divide(); draw(); judge(); }),
-  mend: guarded(async () => { await insist(api.mend); await takeLabels(); await refresh(); draw(); judge(); }),
+  mend: guarded(async () => {
+    state.isJudging = true;
+    draw();
+    try { await insist(api.mend); await takeLabels(); await refresh(); } catch (e) { state.isJudging = false; draw(); throw e; }
+    judge();
+  }),
   mirror: guarded(async () => {
     busy(words.working.mirror);
     try { await insist(api.mirror); await takeLabels(); await refresh(); draw(); judge(); } finally { busy(""); }
