@@ -125,19 +125,7 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
         .enumerate()
         .filter_map(|(i, p)| Some((i, p?)))
         .collect();
-    // Tall pieces first saves height, large ones first saves plates, so both orders are tried. The sort is
-    // stable, so ties stay in order.
-    let by = |measure: fn(&Pose) -> f64| {
-        let mut order: Vec<usize> = (0..fitting.len()).collect();
-        order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
-        improve(printer, &fitting, order)
-    };
-    let (high, large) = (by(|pose| pose.bounds.size().z), by(Pose::footprint_mm2));
-    let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) {
-        high
-    } else {
-        large
-    };
+    let fitting_spots = best_packing(printer, &fitting);
     let n_plates = fitting_spots.n_plates();
     let mut poses: Vec<Laid> = fitting_spots
         .0
@@ -171,6 +159,45 @@ impl Packing {
         }
         heights.iter().fold(0.0, |sum, mm| sum + mm)
     }
+}
+
+/// Finds a packing of low cost: packs by all `orders`, and improves the best few.
+fn best_packing(printer: &Printer, poses: &[(usize, Pose)]) -> Packing {
+    /// Number of orders improved.
+    const N_IMPROVED: usize = 3;
+    let mut tries: Vec<(f64, Vec<usize>)> = orders(poses)
+        .into_iter()
+        .map(|order| (pack_in_order(printer, poses, &order).cost(poses), order))
+        .collect();
+    // The sort is stable, so ties stay in order.
+    tries.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tries
+        .into_iter()
+        .take(N_IMPROVED)
+        .map(|(_, order)| improve(printer, poses, order))
+        .min_by(|a, b| a.cost(poses).total_cmp(&b.cost(poses)))
+        .unwrap_or(Packing(Vec::new()))
+}
+
+/// Lists orders that may pack well. A plate takes as long as its highest piece, so a number of the highest
+/// pieces goes first, to share plates. Large pieces are the hardest to place, so within each part the
+/// pieces go by footprint.
+fn orders(poses: &[(usize, Pose)]) -> Vec<Vec<usize>> {
+    let largest_first = |order: &mut [usize], measure: fn(&Pose) -> f64| {
+        order.sort_by(|&a, &b| measure(&poses[b].1).total_cmp(&measure(&poses[a].1)));
+    };
+    let mut by_height: Vec<usize> = (0..poses.len()).collect();
+    largest_first(&mut by_height, |pose| pose.bounds.size().z);
+    let by_parts = (0..poses.len()).map(|n_high| {
+        let mut order = by_height.clone();
+        let (high, low) = order.split_at_mut(n_high);
+        largest_first(high, Pose::footprint_mm2);
+        largest_first(low, Pose::footprint_mm2);
+        order
+    });
+    let mut orders: Vec<Vec<usize>> = by_parts.collect();
+    orders.push(by_height);
+    orders
 }
 
 /// Improves an order by swaps of two pieces. Returns the packing of the best order found.

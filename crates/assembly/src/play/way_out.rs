@@ -73,6 +73,8 @@ const BEYOND_MM: f64 = 0.5;
 /// Progress needed for a new walk beyond the pose where the last one started, as a multiple and in mm.
 const FARTHER: f64 = 1.5;
 const FARTHER_MM: f64 = 0.4;
+/// Number of poses of a way that are checked exactly at once.
+const N_AT_ONCE: usize = 4;
 /// Number of poses of a way that are kept.
 const KEPT_POSES: usize = 60;
 
@@ -502,17 +504,30 @@ impl<'a> Walk<'a> {
                 .zip(&at_rest)
                 .all(|(mm3, rest)| *mm3 <= rest + most_mm3)
         };
-        for some in poses.chunks(8) {
+        for some in spread(poses.len()).chunks(N_AT_ONCE) {
             ctx.check()?;
             if !some
                 .par_iter()
-                .all(|pose| shared_mm3(pose).as_ref().is_some_and(is_free))
+                .all(|&i| shared_mm3(&poses[i]).as_ref().is_some_and(is_free))
             {
                 return Ok(false);
             }
         }
         Ok(true)
     }
+}
+
+/// Indices below `n`, each far from those before it: the middle, the quarters, the eighths, and so on. A way
+/// that is not free collides over some length, so this finds a pose there soon.
+fn spread(n: usize) -> Vec<usize> {
+    let n_all = n.next_power_of_two();
+    let n_bits = n_all.trailing_zeros();
+    // The bits of a count, read backwards, are such an order.
+    (1..n_all)
+        .chain([0])
+        .map(|count| count.reverse_bits() >> (usize::BITS - n_bits).min(usize::BITS - 1))
+        .filter(|&i| i < n)
+        .collect()
 }
 
 /// Subset of the poses, including the last, each as displacement and rotation vector.
@@ -578,4 +593,22 @@ pub(super) fn as_met(mesh: &TriMesh) -> Vec<Vec3> {
 fn thin(points: Vec<Vec3>) -> Vec<Vec3> {
     let every = points.len().div_ceil(MOST_POINTS).max(1);
     points.into_iter().step_by(every).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread;
+
+    #[test]
+    fn a_spread_names_every_index_once_and_comes_near_all_of_them_soon() {
+        for n in [0, 1, 2, 3, 7, 64, 119] {
+            let order = spread(n);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..n).collect::<Vec<_>>());
+            // Among the first eight, one is in each eighth that is whole.
+            let far = |i: usize| order.iter().take(8).map(|&o| o.abs_diff(i)).min();
+            assert!((0..n).all(|i| far(i) <= Some(n.next_power_of_two() / 8)));
+        }
+    }
 }
