@@ -79,22 +79,20 @@ impl TriangleBvh {
     pub fn with_groups(mesh: &TriMesh, group_of_face: &[u32]) -> Self {
         let n = u32::try_from(mesh.triangles.len()).expect("faces are counted in 32 bits");
         work::INDEXED_TRIANGLES.add(mesh.triangles.len());
-        let corners = |face: u32| mesh.corners(face as usize);
-        let boxes: Vec<Aabb> = (0..n).into_par_iter().map(|f| Aabb::around(corners(f))).collect();
-        let builder = Builder {
-            centers: boxes.par_iter().map(|b| b.center()).collect(),
-            boxes,
-            group_of_face,
+        let item = |face: u32| Item {
+            bounds: Aabb::around(mesh.corners(face as usize)),
+            face,
+            group: group_of_face.get(face as usize).copied().unwrap_or(0),
         };
-        let mut order: Vec<u32> = (0..n).collect();
-        let nodes = builder.tree(&mut order, 0, 0);
-        let groups: Vec<u32> = order.iter().map(|&f| builder.group(f)).collect();
+        let mut items: Vec<Item> = (0..n).into_par_iter().map(item).collect();
+        let nodes = tree(&mut items, 0, 0);
+        let groups: Vec<u32> = items.iter().map(|item| item.group).collect();
         Self {
             groups_below: groups_below(&nodes, &groups),
             nodes,
-            corners: order.par_iter().map(|&f| corners(f)).collect(),
+            corners: items.par_iter().map(|item| mesh.corners(item.face as usize)).collect(),
             groups,
-            faces: order,
+            faces: items.iter().map(|item| item.face).collect(),
         }
     }
 
@@ -309,86 +307,85 @@ fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Op
 /// Smallest number of triangles for which a subtree is built on its own thread.
 const LEAST_APART: usize = 1 << 13;
 
-/// Input from which a tree is built.
-struct Builder<'a> {
-    boxes: Vec<Aabb>,
-    centers: Vec<Vec3>,
-    group_of_face: &'a [u32],
+/// A triangle while the tree is built. Items move together with their boxes, so that each pass reads memory
+/// in sequence.
+#[derive(Clone, Copy)]
+struct Item {
+    bounds: Aabb,
+    face: u32,
+    group: u32,
 }
 
-impl Builder<'_> {
-    fn group(&self, face: u32) -> u32 {
-        self.group_of_face.get(face as usize).copied().unwrap_or(0)
+/// Builds the tree over `items`, whose first triangle has position `first` in leaf order. The root is node 0.
+/// The tree's shape is the same on any number of threads.
+fn tree(items: &mut [Item], first: usize, depth: u32) -> Vec<Node> {
+    if items.len() < LEAST_APART {
+        let mut nodes = vec![leaf(items, first)];
+        let mut moved = Vec::with_capacity(items.len());
+        split(&mut nodes, 0, items, &mut moved, depth);
+        return nodes;
     }
+    let mut root = leaf(items, first);
+    let middle = partition(items, &mut Vec::new(), depth > MAX_UNEVEN_DEPTH);
+    let (left, right) = items.split_at_mut(middle);
+    let (left, right) = rayon::join(
+        || tree(left, first, depth + 1),
+        || tree(right, first + middle, depth + 1),
+    );
+    (root.first, root.count) = (1, 0);
+    // Both roots come first, then the nodes below the left root, then those below the right root.
+    let moved = |node: &Node, by: usize| Node {
+        first: if node.count == 0 {
+            node.first + by as u32
+        } else {
+            node.first
+        },
+        ..*node
+    };
+    let (by_left, by_right) = (2, 1 + left.len());
+    let mut nodes = vec![root, moved(&left[0], by_left), moved(&right[0], by_right)];
+    nodes.extend(left[1..].iter().map(|n| moved(n, by_left)));
+    nodes.extend(right[1..].iter().map(|n| moved(n, by_right)));
+    nodes
+}
 
-    /// Builds the tree over `order`, whose first triangle has position `first` in leaf order. The root is
-    /// node 0. The tree's shape is the same on any number of threads.
-    fn tree(&self, order: &mut [u32], first: usize, depth: u32) -> Vec<Node> {
-        if order.len() < LEAST_APART {
-            let mut nodes = vec![self.node(order, first)];
-            self.split(&mut nodes, 0, order, first, depth);
-            return nodes;
-        }
-        let mut root = self.node(order, first);
-        let middle = partition(order, &self.boxes, &self.centers, depth > MAX_UNEVEN_DEPTH);
-        let (left, right) = order.split_at_mut(middle);
-        let (left, right) = rayon::join(
-            || self.tree(left, first, depth + 1),
-            || self.tree(right, first + middle, depth + 1),
-        );
-        (root.first, root.count) = (1, 0);
-        // Both roots come first, then the nodes below the left root, then those below the right root.
-        let moved = |node: &Node, by: usize| Node {
-            first: if node.count == 0 {
-                node.first + by as u32
-            } else {
-                node.first
-            },
-            ..*node
-        };
-        let (by_left, by_right) = (2, 1 + left.len());
-        let mut nodes = vec![root, moved(&left[0], by_left), moved(&right[0], by_right)];
-        nodes.extend(left[1..].iter().map(|n| moved(n, by_left)));
-        nodes.extend(right[1..].iter().map(|n| moved(n, by_right)));
-        nodes
-    }
-
-    /// Makes a leaf of the triangles of `order`.
-    fn node(&self, order: &[u32], first: usize) -> Node {
-        let shared = order.first().map_or(0, |&f| self.group(f));
-        Node {
-            bounds: order
-                .iter()
-                .fold(Aabb::EMPTY, |b, &f| b.union(self.boxes[f as usize])),
-            first: first as u32,
-            count: order.len() as u32,
-            group: if order.iter().all(|&f| self.group(f) == shared) {
-                shared
-            } else {
-                MIXED
-            },
-        }
-    }
-
-    /// Splits leaf `at` of `nodes`, which has the triangles of `order`, until leaves are small.
-    fn split(&self, nodes: &mut Vec<Node>, at: usize, order: &mut [u32], first: usize, depth: u32) {
-        if order.len() <= LEAF_SIZE {
-            return;
-        }
-        let middle = partition(order, &self.boxes, &self.centers, depth > MAX_UNEVEN_DEPTH);
-        let (left, right) = order.split_at_mut(middle);
-        let child = nodes.len();
-        nodes.extend([self.node(left, first), self.node(right, first + middle)]);
-        (nodes[at].first, nodes[at].count) = (child as u32, 0);
-        self.split(nodes, child, left, first, depth + 1);
-        self.split(nodes, child + 1, right, first + middle, depth + 1);
+/// Makes a leaf of `items`.
+fn leaf(items: &[Item], first: usize) -> Node {
+    let shared = items.first().map_or(0, |item| item.group);
+    Node {
+        bounds: items
+            .iter()
+            .fold(Aabb::EMPTY, |b, item| b.union(item.bounds)),
+        first: first as u32,
+        count: items.len() as u32,
+        group: if items.iter().all(|item| item.group == shared) {
+            shared
+        } else {
+            MIXED
+        },
     }
 }
 
-/// Splits `faces` in place where the surface-area heuristic is least. Returns the number of faces that go
+/// Splits leaf `at` of `nodes`, which has the triangles of `items`, until leaves are small. `moved` is memory
+/// for items on their way.
+fn split(nodes: &mut Vec<Node>, at: usize, items: &mut [Item], moved: &mut Vec<Item>, depth: u32) {
+    if items.len() <= LEAF_SIZE {
+        return;
+    }
+    let first = nodes[at].first as usize;
+    let middle = partition(items, moved, depth > MAX_UNEVEN_DEPTH);
+    let (left, right) = items.split_at_mut(middle);
+    let child = nodes.len();
+    nodes.extend([leaf(left, first), leaf(right, first + middle)]);
+    (nodes[at].first, nodes[at].count) = (child as u32, 0);
+    split(nodes, child, left, moved, depth + 1);
+    split(nodes, child + 1, right, moved, depth + 1);
+}
+
+/// Splits `items` in place where the surface-area heuristic is least. Returns the number of items that go
 /// left, never 0 or all.
-fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bool) -> usize {
-    let span = Aabb::around(faces.iter().map(|&f| centers[f as usize]));
+fn partition(items: &mut [Item], moved: &mut Vec<Item>, must_halve: bool) -> usize {
+    let span = Aabb::around(items.iter().map(|item| item.bounds.center()));
     let size = span.size();
     let axis = if size.x >= size.y && size.x >= size.z {
         0
@@ -396,53 +393,71 @@ fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bo
         1 + usize::from(size.z > size.y)
     };
     let width = size[axis];
-    let half = faces.len() / 2;
-    let by_center = |a: &u32, b: &u32| {
-        centers[*a as usize][axis]
-            .total_cmp(&centers[*b as usize][axis])
-            .then(a.cmp(b))
-    };
-    if must_halve || width <= 0.0 || faces.len() < 16 {
-        faces.select_nth_unstable_by(half, by_center);
-        return half;
+    if must_halve || width <= 0.0 || items.len() < 16 {
+        return halve(items, axis);
     }
-    let bin_of = |f: u32| {
-        (((centers[f as usize][axis] - span.min[axis]) / width * N_BINS as f64) as usize).min(N_BINS - 1)
+    let bin_of = |item: &Item| {
+        let share = (item.bounds.center()[axis] - span.min[axis]) / width;
+        ((share * N_BINS as f64) as usize).min(N_BINS - 1)
     };
     let mut bins = [(Aabb::EMPTY, 0usize); N_BINS];
-    for &f in faces.iter() {
-        let bin = &mut bins[bin_of(f)];
-        *bin = (bin.0.union(boxes[f as usize]), bin.1 + 1);
+    for item in items.iter() {
+        let bin = &mut bins[bin_of(item)];
+        *bin = (bin.0.union(item.bounds), bin.1 + 1);
     }
+    let Some(cut) = cheapest_cut(&bins) else {
+        return halve(items, axis);
+    };
+    // A stable partition keeps the order, and with it the tree, a function of the mesh alone.
+    moved.clear();
+    let mut n_left = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        if bin_of(&item) < cut {
+            items[n_left] = item;
+            n_left += 1;
+        } else {
+            moved.push(item);
+        }
+    }
+    items[n_left..].copy_from_slice(moved);
+    n_left
+}
+
+/// Moves the half of `items` with the smaller centres along `axis` to the front. Returns its length.
+fn halve(items: &mut [Item], axis: usize) -> usize {
+    let half = items.len() / 2;
+    items.select_nth_unstable_by(half, |a, b| {
+        let [a_at, b_at] = [a, b].map(|item| item.bounds.center()[axis]);
+        a_at.total_cmp(&b_at).then(a.face.cmp(&b.face))
+    });
+    half
+}
+
+/// Number of bins that go left if the sum of box area × number of triangles on both sides is least; `None` if
+/// one bin holds all.
+fn cheapest_cut(bins: &[(Aabb, usize); N_BINS]) -> Option<usize> {
     let half_area = |b: Aabb| {
         let s = b.size();
         s.x * s.y + s.y * s.z + s.z * s.x
     };
-    let cost_of = |part: &[(Aabb, usize)]| {
-        let (b, n) = part
-            .iter()
-            .fold((Aabb::EMPTY, 0), |acc, x| (acc.0.union(x.0), acc.1 + x.1));
-        (half_area(b) * n as f64, n)
+    let grow = |sum: &mut (Aabb, usize), bin: &(Aabb, usize)| {
+        *sum = (sum.0.union(bin.0), sum.1 + bin.1);
+        Some(*sum)
     };
-    let best = (1..N_BINS)
-        .filter_map(|cut| {
-            let (left, right) = (cost_of(&bins[..cut]), cost_of(&bins[cut..]));
-            (left.1 > 0 && right.1 > 0).then_some((cut, left.0 + right.0))
-        })
-        .min_by(|a, b| a.1.total_cmp(&b.1));
-    match best {
-        None => {
-            faces.select_nth_unstable_by(half, by_center);
-            half
-        }
-        Some((cut, _)) => {
-            // A stable partition keeps the order, and with it the tree, a function of the mesh alone.
-            let (left, right): (Vec<u32>, Vec<u32>) = faces.iter().partition(|&&f| bin_of(f) < cut);
-            faces[..left.len()].copy_from_slice(&left);
-            faces[left.len()..].copy_from_slice(&right);
-            left.len()
-        }
+    let mut right = [(Aabb::EMPTY, 0); N_BINS];
+    let sums = bins.iter().rev().scan((Aabb::EMPTY, 0), |sum, bin| grow(sum, bin));
+    for (at, sum) in right.iter_mut().rev().zip(sums) {
+        *at = sum;
     }
+    let left = bins.iter().scan((Aabb::EMPTY, 0), |sum, bin| grow(sum, bin));
+    let cost = |(b, n): (Aabb, usize)| half_area(b) * n as f64;
+    (1..N_BINS)
+        .zip(left)
+        .filter(|(cut, left)| left.1 > 0 && right[*cut].1 > 0)
+        .map(|(cut, left)| (cut, cost(left) + cost(right[cut])))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(cut, _)| cut)
 }
 
 /// Point of triangle `abc` nearest to `q`, and the part of the triangle on which it lies. [Ericson2005,

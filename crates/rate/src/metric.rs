@@ -21,7 +21,7 @@ mod what_if;
 
 pub use choice::{
     BY_SIMULATION, Bears, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
-    SeamHolding, WeakestUse, choose, choose_or_change,
+    SeamHolding, Stand, WeakestUse, choose, choose_or_change,
 };
 pub use climb::{ClimbError, ClimbParams, ClimbRules, Climbed, climb};
 pub use data_driven::{data_driven, pieces_alone};

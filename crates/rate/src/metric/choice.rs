@@ -204,19 +204,29 @@ pub fn choose(
     foresight: &Foresight,
     found: FoundPlan,
 ) -> Result<Chosen, ChoiceError> {
-    let chosen = choose_or_change(ctx, choice, foresight, found, |_, _| None::<Infallible>)?;
+    let chosen = choose_or_change(ctx, choice, foresight, found, |_| None::<Infallible>)?;
     chosen.map_err(|never| match never {})
 }
 
-/// Chooses a plan as [`choose`] does, or a change to make first. Once the uses are climbed, `change` sees the
-/// plan and its load factors in use. What it returns is returned in place of a plan, and no other goal is
-/// climbed.
+/// A plan on the climb, and what it withstands.
+pub struct Stand<'a> {
+    /// The strongest plan so far.
+    pub plan: &'a RankedPlan,
+    /// Its load factors in use.
+    pub bears: Vec<LoadBorne>,
+    /// True after the first heat of the climb; false once the uses are climbed.
+    pub is_early: bool,
+}
+
+/// Chooses a plan as [`choose`] does, or a change to make first. `change` sees the strongest plan early in
+/// the climb, and once the uses are climbed. What it returns is returned in place of a plan, and nothing else
+/// is climbed.
 pub fn choose_or_change<T>(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
     foresight: &Foresight,
     mut found: FoundPlan,
-    change: impl FnOnce(&RankedPlan, &[LoadBorne]) -> Option<T>,
+    change: impl FnMut(Stand<'_>) -> Option<T>,
 ) -> Result<Result<Chosen, T>, ChoiceError> {
     ctx.stage("strongest plan", 0)?;
     let model = &foresight.model;
@@ -293,7 +303,7 @@ fn strongest<'b, T>(
     foresight: &Foresight,
     bench: &'b Bench<'b>,
     found: &FoundPlan,
-    change: impl FnOnce(&RankedPlan, &[LoadBorne]) -> Option<T>,
+    mut change: impl FnMut(Stand<'_>) -> Option<T>,
 ) -> Result<Result<Climbed<'b>, T>, ChoiceError> {
     let Some(first) = found.pool.first() else {
         return Err(ChoiceError::NoPlan);
@@ -314,32 +324,34 @@ fn strongest<'b, T>(
         around,
         may_be,
     };
-    let is_changed = |rated: &Rated<'_>| change(&rated.candidate, &bears(&foresight.model, bench, rated));
-    let climbed = match Ascent::of_use(ctx, rules, bench, &starts) {
-        Ok(ascent) => match is_changed(&ascent.best) {
-            Some(changed) => return Ok(Err(changed)),
-            None => ascent.finish(),
-        },
+    let mut change_at = |rated: &Rated<'_>, is_early: bool| {
+        let (plan, bears) = (&rated.candidate, bears(&foresight.model, bench, rated));
+        change(Stand { plan, bears, is_early })
+    };
+    let mut ascent = match Ascent::begin(ctx, rules, bench, &starts) {
+        Ok(ascent) => ascent,
         Err(ClimbError::NoPlan) => {
             let best = bench.rate(first.clone())?;
-            if let Some(changed) = is_changed(&best) {
-                return Ok(Err(changed));
-            }
-            Ok(Climbed {
-                best,
-                n_plans: 1,
-                n_solves: 0,
-                is_cut_short: false,
-            })
+            return Ok(match change_at(&best, false) {
+                Some(changed) => Err(changed),
+                None => Ok(Climbed {
+                    best,
+                    n_plans: 1,
+                    n_solves: 0,
+                    is_cut_short: false,
+                }),
+            });
         }
-        Err(e) => Err(e),
+        Err(e) => return Err(e.into()),
     };
-    match climbed {
-        Ok(climbed) => Ok(Ok(climbed)),
-        Err(ClimbError::NoPlan) => Err(ChoiceError::NoPlan),
-        Err(ClimbError::Solve(e)) => Err(e.into()),
-        Err(ClimbError::Cancelled(e)) => Err(e.into()),
+    if let Some(changed) = change_at(ascent.best()?, true) {
+        return Ok(Err(changed));
     }
+    ascent.race()?;
+    if let Some(changed) = change_at(ascent.best()?, false) {
+        return Ok(Err(changed));
+    }
+    Ok(Ok(ascent.finish()?))
 }
 
 /// Load factors of a plan, in assembly space.
@@ -531,4 +543,14 @@ pub enum ChoiceError {
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<ClimbError> for ChoiceError {
+    fn from(e: ClimbError) -> Self {
+        match e {
+            ClimbError::NoPlan => Self::NoPlan,
+            ClimbError::Solve(e) => e.into(),
+            ClimbError::Cancelled(stop) => stop.into(),
+        }
+    }
 }

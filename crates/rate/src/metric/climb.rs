@@ -118,20 +118,27 @@ pub fn climb<'b>(
     bench: &'b Bench<'b>,
     starts: &[RankedPlan],
 ) -> Result<Climbed<'b>, ClimbError> {
-    Ascent::of_use(ctx, rules, bench, starts)?.finish()
+    let mut ascent = Ascent::begin(ctx, rules, bench, starts)?;
+    ascent.race()?;
+    ascent.finish()
 }
 
-/// A climb of which the uses are done.
+/// A climb for use, from several starts at once.
+///
+/// Starts race in heats: in each, every start may solve twice as many loads as in the one before. The first
+/// plan that withstands enough wins, else the strongest one in the end.
 pub(super) struct Ascent<'c, 'b> {
     climber: Climber<'c, 'b>,
-    /// The plan that withstands use best.
-    pub best: Rated<'b>,
+    /// Plans that were reached; true if no move improves one any more.
+    runners: Vec<(Rated<'b>, bool)>,
+    /// Number of loads that each start may solve in the next heat.
+    n_each: usize,
     limits: ClimbParams,
 }
 
 impl<'c, 'b> Ascent<'c, 'b> {
-    /// Climbs for use alone. Starts race: the first that withstands enough ends it.
-    pub fn of_use(
+    /// Runs the first heat.
+    pub fn begin(
         ctx: &'c Ctx<'c>,
         rules: ClimbRules<'c>,
         bench: &'b Bench<'b>,
@@ -149,17 +156,55 @@ impl<'c, 'b> Ascent<'c, 'b> {
             floors: vec![0.0; bench.ranks.len()],
         };
         let starts = climber.best_starts(starts, limits.n_starts)?;
-        Ok(Self {
-            best: climber.race(starts, limits.n_of_use)?,
+        let mut ascent = Self {
             climber,
+            runners: starts.into_iter().map(|start| (start, false)).collect(),
+            n_each: FIRST_HEAT,
             limits,
-        })
+        };
+        ascent.run_heat()?;
+        Ok(ascent)
+    }
+
+    /// Runs heats until a plan withstands enough, none can be improved, or the limit is reached.
+    pub fn race(&mut self) -> Result<(), ClimbError> {
+        while self.climber.n_solves < self.limits.n_of_use
+            && !self.climber.is_cut_short
+            && self.runners.iter().any(|runner| !runner.1)
+        {
+            self.run_heat()?;
+        }
+        Ok(())
+    }
+
+    fn run_heat(&mut self) -> Result<(), ClimbError> {
+        let climber = &mut self.climber;
+        for (at, is_top) in self.runners.iter_mut().filter(|runner| !runner.1) {
+            let until = self.limits.n_of_use.min(climber.n_solves + self.n_each);
+            (*at, *is_top) = climber.ascend(at.clone(), Rank::Use, until)?;
+            if at.bears_enough() {
+                self.runners = vec![(at.clone(), true)];
+                return Ok(());
+            }
+        }
+        self.n_each *= 2;
+        Ok(())
+    }
+
+    /// The plan that withstands use best.
+    pub fn best(&self) -> Result<&Rated<'b>, ClimbError> {
+        let plans = self.runners.iter().map(|runner| &runner.0);
+        let strongest = plans.reduce(|best, plan| match is_above(plan, best, Rank::Use) {
+            true => plan,
+            false => best,
+        });
+        strongest.ok_or(ClimbError::NoPlan)
     }
 
     /// Climbs for the other goals, without loss in use.
     pub fn finish(mut self) -> Result<Climbed<'b>, ClimbError> {
+        let mut best = self.best()?.clone();
         let climber = &mut self.climber;
-        let mut best = self.best;
         climber.keep(&best, Rank::Use);
         for (rank, n_solves) in [
             (Rank::Pull, self.limits.n_of_pull),
@@ -288,29 +333,6 @@ impl<'b> Climber<'_, 'b> {
         self.n_plans += all.len();
         self.n_solves += all.iter().map(|t| t.1).sum::<usize>();
         Ok(all.into_iter().filter_map(|t| t.0).collect())
-    }
-
-    /// Climbs from all starts for use, in heats: in each, every start may solve twice as many loads as in the
-    /// one before. The first plan that withstands enough wins, else the strongest one in the end.
-    fn race(&mut self, starts: Vec<Rated<'b>>, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
-        let mut runners: Vec<(Rated<'b>, bool)> = starts.into_iter().map(|start| (start, false)).collect();
-        let mut n_each = FIRST_HEAT;
-        while self.n_solves < most_solves && !self.is_cut_short && runners.iter().any(|runner| !runner.1) {
-            for (at, is_top) in runners.iter_mut().filter(|runner| !runner.1) {
-                let until = most_solves.min(self.n_solves + n_each);
-                (*at, *is_top) = self.ascend(at.clone(), Rank::Use, until)?;
-                if at.bears_enough() {
-                    return Ok(at.clone());
-                }
-            }
-            n_each *= 2;
-        }
-        let plans = runners.into_iter().map(|runner| runner.0);
-        let strongest = plans.reduce(|best, plan| match is_above(&plan, &best, Rank::Use) {
-            true => plan,
-            false => best,
-        });
-        strongest.ok_or(ClimbError::NoPlan)
     }
 
     /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. Returns the

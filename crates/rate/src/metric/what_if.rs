@@ -35,6 +35,8 @@ pub struct WhatIf<'a> {
     pub plan: &'a RankedPlan,
     /// Load factor that is asked for.
     pub least_factor: f64,
+    /// Factor by which the climb is expected to strengthen the plan further; 1 at its end.
+    pub gain: f64,
 }
 
 impl WhatIf<'_> {
@@ -45,14 +47,14 @@ impl WhatIf<'_> {
 
     /// Enlarges, to the largest that fits, the connectors of every pair that opens under a load which the kit
     /// does not withstand; `bears` are its load factors. Repeats, since another pair may then open first.
-    /// Returns the best round's sizes and its least load factor.
+    /// Returns the best round's sizes and the least load factor that is expected with them.
     pub fn enlarge(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), SparseError> {
-        let mut best = (self.sizes.clone(), least(bears));
+        let mut best = (self.sizes.clone(), self.least(bears));
         let (mut sizes, mut uses) = (best.0.clone(), bears.to_vec());
         for _ in 0..MOST_ROUNDS {
             let failing = uses
                 .iter()
-                .filter(|b| b.deed.is_use() && !self.is_enough(factor(b)));
+                .filter(|b| b.deed.is_use() && !self.is_enough(self.gain * factor(b)));
             let parting: Vec<(&LoadBorne, [PatchId; 2])> =
                 failing.filter_map(|b| Some((b, b.first?.between))).collect();
             let mut has_grown = false;
@@ -63,8 +65,8 @@ impl WhatIf<'_> {
                 break;
             }
             uses = self.rate(self.handling.wall_mm, &sizes.sizes)?;
-            if least(&uses) > best.1 {
-                best = (sizes.clone(), least(&uses));
+            if self.least(&uses) > best.1 {
+                best = (sizes.clone(), self.least(&uses));
             }
             if self.is_enough(best.1) {
                 break;
@@ -74,7 +76,7 @@ impl WhatIf<'_> {
     }
 
     /// Finds the thinnest wall up to `most_mm` that is strong enough with connectors of these sizes, or the
-    /// thickest one if that gains something over the load factor `before`; `None` if the model is not hollow
+    /// thickest one if that gains something over the expected load factor `before`; `None` if the model is not hollow
     /// with such a wall.
     pub fn thicken(
         &self,
@@ -94,12 +96,18 @@ impl WhatIf<'_> {
                 break;
             }
             wall_mm = next_mm;
-            borne = least(&self.rate(wall_mm, sizes)?);
+            borne = self.least(&self.rate(wall_mm, sizes)?);
             if borne >= self.least_factor {
                 break;
             }
         }
         Ok((wall_mm > self.handling.wall_mm && is_worth(before, borne)).then_some(wall_mm))
+    }
+
+    /// Least load factor in use that is expected at the end of the climb.
+    fn least(&self, bears: &[LoadBorne]) -> f64 {
+        let uses = bears.iter().filter(|b| b.deed.is_use());
+        self.gain * uses.map(factor).fold(f64::INFINITY, f64::min)
     }
 
     /// Load factors of the plan in each use, with a wall of this thickness and connectors of these sizes.
@@ -138,11 +146,6 @@ pub fn weakest_use(bears: &[LoadBorne], asked: f64) -> Option<(&LoadBorne, f64)>
 
 fn factor(load: &LoadBorne) -> f64 {
     load.factor.unwrap_or(f64::INFINITY)
-}
-
-fn least(bears: &[LoadBorne]) -> f64 {
-    let uses = bears.iter().filter(|b| b.deed.is_use());
-    uses.map(factor).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use super::strengthen::strengthen;
 use super::trial::{Change, Learned, Parts};
 use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
-use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams};
+use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams, Stand};
 use crate::plan::lesson::Lesson;
-use crate::plan::{LatticePlan, PlanOutcome, RankedPlan};
+use crate::plan::{LatticePlan, PlanOutcome};
 use crate::segmentation::join;
 use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 
@@ -311,10 +311,12 @@ pub(super) fn next_plan(
             return Ok(Next::Changes(vec![change], None));
         }
     }
-    let or_changes = |plan: &RankedPlan, bears: &[LoadBorne]| {
-        *former = Some(plan.plan.clone());
-        ctx.note(&words_of_least(bears, allowance.least_factor));
-        match strengthen(ctx, planning, &handling, (plan, bears), allowance) {
+    let or_changes = |stand: Stand<'_>| {
+        if !stand.is_early {
+            ctx.note(&words_of_least(&stand.bears, allowance.least_factor));
+        }
+        *former = Some(stand.plan.plan.clone());
+        match strengthen(ctx, planning, &handling, &stand, allowance) {
             Ok((changes, late_change)) => {
                 late = late.or(late_change);
                 (!changes.is_empty()).then_some(Ok(changes))
