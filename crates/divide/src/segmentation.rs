@@ -32,7 +32,7 @@ use fewer::{disagreement, with_fewer_parts};
 use ground::Ground;
 use halve::halve_long_edges;
 pub use keep_whole::{KeepWhole, resolve_regions, whole};
-use mend::{held_twice, mirror_images};
+use mend::{Mended, held_twice, mirror_images};
 pub use method::{Method, automatic_labels, mirrored_labels, symmetry_plane};
 use method::{automatic_on, creases_on};
 pub use refine::refine;
@@ -165,6 +165,14 @@ impl FaceLabels {
         }
         Self {
             patch_of_face: component.into_iter().map(|c| id[c as usize]).collect(),
+            n_patches,
+        }
+    }
+
+    /// Labels as they are, each of which is connected and below `n_patches`.
+    fn of_connected(label: &[u32], n_patches: usize) -> Self {
+        Self {
+            patch_of_face: label.to_vec(),
             n_patches,
         }
     }
@@ -452,6 +460,8 @@ fn best_contacts(
     limit: f64,
 ) -> Result<Option<(f64, SegmentedSurface)>, SegmentationError> {
     let mut best: Option<(f64, SegmentedSurface)> = None;
+    // Patches whose contacts are longer than any later limit. They would only cost more under it.
+    let mut held: Option<FaceLabels> = None;
     for (i, limit_mm) in contact_limits(params).into_iter().enumerate() {
         let limited = SegmentationParams {
             min_contact_mm: limit_mm,
@@ -459,11 +469,19 @@ fn best_contacts(
         };
         let shorter = SHORTER_COST * i as f64;
         let limit = best.as_ref().map_or(limit, |b| b.0);
-        let is_too_dear = |mended: &FaceLabels| origin.least_cost(labels, mended) + shorter >= limit;
-        if let Some((faults, surface)) = held_twice(ctx, &limited, ground, labels, origin, is_too_dear)? {
-            let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + shorter;
+        let not_worth = |mended: &FaceLabels| {
+            held.as_ref() == Some(mended) || origin.least_cost(labels, mended) + shorter >= limit
+        };
+        if let Some(mended) = held_twice(ctx, &limited, ground, labels, origin, not_worth)? {
+            let Mended {
+                n_faults, surface, ..
+            } = mended;
+            let cost = FAULT_COST * n_faults as f64 + origin.cost(labels, &surface) + shorter;
             if cost < limit {
                 best = Some((cost, surface));
+            }
+            if n_faults == 0 {
+                held = Some(mended.labels);
             }
         }
         if best

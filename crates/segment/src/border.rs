@@ -43,7 +43,7 @@ impl<'a> Settler<'a> {
     }
 
     /// Moves borders like [`settle`], but keeps the old border of a pair if `allows` rejects the new one.
-    /// `allows` is given the labels after the move and the pair.
+    /// `allows` is given the labels after the move and the pair; it is not asked about a border that stays.
     pub fn settle(&self, band_mm: f64, labels: &mut [u32], mut allows: impl FnMut(&[u32], [u32; 2]) -> bool) {
         let mut seeds: BTreeMap<[u32; 2], BTreeSet<u32>> = BTreeMap::new();
         for crease in &self.graph.creases {
@@ -58,7 +58,7 @@ impl<'a> Settler<'a> {
         let mut distance = vec![f64::INFINITY; self.graph.n_faces()];
         let mut moved = labels.to_vec();
         for (pair, seeds) in seeds {
-            settle_pair(
+            let changed = settle_pair(
                 self.graph,
                 band_mm,
                 &self.price,
@@ -67,15 +67,21 @@ impl<'a> Settler<'a> {
                 &mut distance,
                 &mut moved,
             );
-            if allows(&moved, pair) {
-                labels.copy_from_slice(&moved);
-            } else {
-                moved.copy_from_slice(labels);
+            if changed.is_empty() {
+                continue;
+            }
+            let (from, to): (&[u32], &mut [u32]) = match allows(&moved, pair) {
+                true => (&moved, labels),
+                false => (labels, &mut moved),
+            };
+            for face in changed {
+                to[face as usize] = from[face as usize];
             }
         }
     }
 }
 
+/// Moves the border between two labels. Returns the faces whose label changed.
 fn settle_pair(
     graph: &FaceGraph,
     band_mm: f64,
@@ -84,7 +90,7 @@ fn settle_pair(
     seeds: &BTreeSet<u32>,
     distance: &mut [f64],
     labels: &mut [u32],
-) {
+) -> Vec<u32> {
     let band = within(graph, seeds, band_mm, distance, |f| {
         [a, b].contains(&labels[f as usize])
     });
@@ -122,16 +128,20 @@ fn settle_pair(
         }
     }
     let (_, sides) = flow.least_cut();
+    let mut changed = Vec::new();
     for (&face, &here) in &node {
-        labels[face as usize] = if sides[here as usize] == Terminal::Source {
+        let label = if sides[here as usize] == Terminal::Source {
             a
         } else {
             b
         };
-    }
-    for &face in &band {
+        if labels[face as usize] != label {
+            labels[face as usize] = label;
+            changed.push(face);
+        }
         distance[face as usize] = f64::INFINITY;
     }
+    changed
 }
 
 /// Faces within `band_mm` of `seeds`, reached through faces that `allowed` accepts, in ascending order.

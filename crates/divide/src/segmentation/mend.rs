@@ -19,9 +19,17 @@ const STRICTER: f64 = 1.15;
 /// Greatest factor on the number of pieces for which both sides are divided alike.
 const MORE_FOR_SYMMETRY: f64 = 1.5;
 
+/// A division that was repaired and cut.
+pub(super) struct Mended {
+    /// Number of faults that are left.
+    pub n_faults: usize,
+    /// Patches before their seams were moved and smoothed.
+    pub labels: FaceLabels,
+    pub surface: SegmentedSurface,
+}
+
 /// Repairs, smooths and cuts until the contact graph of the smooth seams has no faults. If no round achieves
-/// this, returns the best round with its number of faults. Stops before it cuts a division that
-/// `is_too_dear`.
+/// this, returns the best round. Stops before it cuts a division that is `not_worth` it.
 ///
 /// Divides both sides alike if that is requested and leaves no fault.
 pub(super) fn held_twice(
@@ -30,19 +38,20 @@ pub(super) fn held_twice(
     ground: &Ground<'_>,
     labels: &FaceLabels,
     origin: LabelOrigin<'_>,
-    is_too_dear: impl Fn(&FaceLabels) -> bool,
-) -> Result<Option<(usize, SegmentedSurface)>, SegmentationError> {
+    not_worth: impl Fn(&FaceLabels) -> bool,
+) -> Result<Option<Mended>, SegmentationError> {
     let job = Job {
         ctx,
         params,
         ground,
         is_drawn: matches!(origin, LabelOrigin::Drawn { .. }),
-        is_too_dear: &is_too_dear,
+        not_worth: &not_worth,
     };
     if let Some(mirrored) = origin.mirror()
-        && let Some((0, surface)) = job.rounds(labels.clone(), Some(mirrored))?
+        && let Some(mended) = job.rounds(labels.clone(), Some(mirrored))?
+        && mended.n_faults == 0
     {
-        return Ok(Some((0, surface)));
+        return Ok(Some(mended));
     }
     job.rounds(labels.clone(), None)
 }
@@ -52,24 +61,24 @@ struct Job<'a> {
     params: &'a SegmentationParams,
     ground: &'a Ground<'a>,
     is_drawn: bool,
-    is_too_dear: &'a dyn Fn(&FaceLabels) -> bool,
+    not_worth: &'a dyn Fn(&FaceLabels) -> bool,
 }
 
 impl Job<'_> {
-    /// Runs rounds with ever stricter limits. Returns the best, with its number of faults.
+    /// Runs rounds with ever stricter limits. Returns the best.
     fn rounds(
         &self,
         mut labels: FaceLabels,
         mirrored: Option<&Mirrored>,
-    ) -> Result<Option<(usize, SegmentedSurface)>, SegmentationError> {
+    ) -> Result<Option<Mended>, SegmentationError> {
         let mut strict = self.params.clone();
-        let mut best: Option<(usize, SegmentedSurface)> = None;
+        let mut best: Option<Mended> = None;
         for _ in 0..MAX_ROUNDS {
             labels = refine_on(self.ctx, &strict, self.ground, &labels)?;
             if let Some(mirrored) = mirrored {
                 labels = mended_alike(self.ctx, &strict, self.ground, mirrored, labels)?;
             }
-            if (self.is_too_dear)(&labels) {
+            if (self.not_worth)(&labels) {
                 break;
             }
             let surface = if self.is_drawn {
@@ -78,11 +87,15 @@ impl Job<'_> {
                 smooth_and_cut(self.ctx, self.params, self.ground.solid, &labels)?
             };
             let graph = surface.contact_graph_below(self.params.wall_mm, self.params.min_contact_mm);
-            let faults = graph.n_faults();
-            if best.as_ref().is_none_or(|b| faults < b.0) {
-                best = Some((faults, surface));
+            let n_faults = graph.n_faults();
+            if best.as_ref().is_none_or(|b| n_faults < b.n_faults) {
+                best = Some(Mended {
+                    n_faults,
+                    labels: labels.clone(),
+                    surface,
+                });
             }
-            if faults == 0 {
+            if n_faults == 0 {
                 break;
             }
             strict.min_contact_mm *= STRICTER;

@@ -4,6 +4,7 @@
 //! within a band and takes the cheapest path. The price is its length, reduced in concave creases
 //! ([`border::prices`]).
 
+use shellock_geom::Topology;
 use shellock_segment::border;
 
 use super::ground::Ground;
@@ -25,26 +26,28 @@ pub(super) fn settle_seams(
     let graph = ground.graph();
     let settler = border::Settler::new(graph);
     let mut label = labels.as_slice().to_vec();
-    let areas = |label: &[u32], of: [u32; 2]| {
-        let area = |k: u32| {
-            (0..label.len())
-                .filter(|&f| label[f] == k)
-                .map(|f| graph.area_mm2[f])
-                .sum::<f64>()
-        };
-        of.map(area)
+    let areas = |label: &[u32]| {
+        let mut areas = vec![0.0; labels.n_patches()];
+        for (f, &k) in label.iter().enumerate() {
+            areas[k as usize] += graph.area_mm2[f];
+        }
+        areas
     };
+    let first = areas(&label);
     let mut n_before = n_faults(params, ground, labels);
     for band_mm in BANDS_MM {
         settler.settle(band_mm, &mut label, |moved, pair| {
-            let (first, now) = (areas(labels.as_slice(), pair), areas(moved, pair));
-            let is_worn = (0..2).any(|side| now[side] < LEAST_KEPT * first[side]);
-            if is_worn || ground.whole.is_parted(moved, pair) {
+            let now = areas(moved);
+            let is_worn = |side: u32| now[side as usize] < LEAST_KEPT * first[side as usize];
+            if pair.into_iter().any(is_worn)
+                || ground.whole.is_parted(moved, pair)
+                || !pair.into_iter().all(|side| is_connected(&ground.topology, moved, side))
+            {
                 return false;
             }
-            let connected = FaceLabels::from_components(&ground.topology, moved);
-            let n_after = n_faults(params, ground, &connected);
-            connected.n_patches() == labels.n_patches() && n_after <= n_before && {
+            // Patches stay connected, so their numbers stay, too.
+            let n_after = n_faults(params, ground, &FaceLabels::of_connected(moved, labels.n_patches()));
+            n_after <= n_before && {
                 n_before = n_after;
                 true
             }
@@ -53,9 +56,29 @@ pub(super) fn settle_seams(
     FaceLabels::from_components(&ground.topology, &label)
 }
 
+/// Returns true if the triangles of a label are not empty, and linked by their edges.
+fn is_connected(topology: &Topology, label: &[u32], own: u32) -> bool {
+    let is_own = |f: u32| label[f as usize] == own;
+    let n_own = label.iter().filter(|&&k| k == own).count();
+    let mut is_reached = vec![false; label.len()];
+    let mut front: Vec<u32> = (0..label.len() as u32).find(|&f| is_own(f)).into_iter().collect();
+    front.iter().for_each(|&f| is_reached[f as usize] = true);
+    let mut n_reached = front.len();
+    while let Some(face) = front.pop() {
+        for next in topology.neighbours(face) {
+            if is_own(next) && !is_reached[next as usize] {
+                is_reached[next as usize] = true;
+                n_reached += 1;
+                front.push(next);
+            }
+        }
+    }
+    n_reached > 0 && n_reached == n_own
+}
+
 #[cfg(test)]
 mod tests {
-    use shellock_geom::{Solid, Topology, Vec3};
+    use shellock_geom::{Solid, Vec3};
     use shellock_testkit::shapes::torus;
 
     use super::*;
