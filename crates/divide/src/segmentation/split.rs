@@ -233,18 +233,27 @@ impl Divider<'_> {
                     .flat_map(|q| [[q[0], p[0], q[1], p[1]], [q[0], p[1], q[1], p[0]]].map(Vec::from)),
             );
         }
+        sources.retain(|s| s[0] != s[s.len() / 2]);
+        // Many candidates share a point, so distances are measured once per point.
+        let mut points = sources.concat();
+        points.sort_unstable();
+        points.dedup();
+        let distance_mm: Vec<Vec<f64>> = points
+            .par_iter()
+            .map(|&point| self.faces.grow(&[(point, 1.0)], inside).0)
+            .collect();
+        let from = |point: &u32| &distance_mm[points.binary_search(point).expect("it is one of them")];
         let nearer_to_second = |sources: Vec<u32>| {
-            let n_first = sources.len() / 2;
-            let sources: Vec<(u32, f64)> = sources.into_iter().map(|f| (f, 1.0)).collect();
-            let (_, owner) = self.faces.grow(&sources, inside);
-            let is_second = |f: &u32| (n_first..sources.len()).contains(&(owner[*f as usize] as usize));
+            let distances: Vec<&Vec<f64>> = sources.iter().map(from).collect();
+            let (first, second) = distances.split_at(distances.len() / 2);
+            let least = |from: &[&Vec<f64>], f: u32| {
+                let all = from.iter().map(|distance_mm| distance_mm[f as usize]);
+                all.fold(f64::INFINITY, f64::min)
+            };
+            let is_second = |f: &u32| least(second, *f) < least(first, *f);
             members.iter().copied().filter(is_second).collect()
         };
-        sources
-            .into_par_iter()
-            .filter(|s| s[0] != s[s.len() / 2])
-            .map(nearer_to_second)
-            .collect()
+        sources.into_par_iter().map(nearer_to_second).collect()
     }
 
     /// Makes both halves connected: triangles outside the largest part of their half join the other half.
