@@ -126,10 +126,7 @@ impl TriangleBvh {
                 }
                 continue;
             }
-            let [a, b] =
-                [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
-            let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-            for child in [farther, closer] {
+            for child in self.children(node, q) {
                 if child.1 <= limit {
                     stack[top] = child;
                     top += 1;
@@ -168,10 +165,7 @@ impl TriangleBvh {
                 }
                 continue;
             }
-            let [a, b] =
-                [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
-            let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-            for child in [farther, closer] {
+            for child in self.children(node, q) {
                 if child.1 <= limit_sq {
                     stack[top] = child;
                     top += 1;
@@ -179,6 +173,14 @@ impl TriangleBvh {
             }
         }
         found.sort_unstable_by_key(|e| e.0);
+    }
+
+    /// Both children of an inner node, with the squared distances of their boxes from `q`: the farther first.
+    #[inline]
+    fn children(&self, node: &Node, q: Vec3) -> [(u32, f64); 2] {
+        let child = |at: u32| (at, self.nodes[at as usize].bounds.distance_sq(q));
+        let (a, b) = (child(node.first), child(node.first + 1));
+        if a.1 <= b.1 { [b, a] } else { [a, b] }
     }
 
     /// Greatest squared distance known of the groups below a node, mm²; `None` if one has none yet.

@@ -42,6 +42,7 @@ impl Topology {
     }
 
     /// Half-edge of the same edge in the triangle on the other side.
+    #[inline]
     pub fn opposite(&self, half_edge: HalfEdge) -> HalfEdge {
         self.opposite[half_edge as usize]
     }
@@ -52,8 +53,14 @@ impl Topology {
     }
 
     /// Triangles across the three edges of `face`; one may occur twice.
+    #[inline]
     pub fn neighbours(&self, face: u32) -> [u32; 3] {
-        [0, 1, 2].map(|corner| self.opposite(3 * face + corner) / 3)
+        let first = 3 * face;
+        [
+            self.opposite(first) / 3,
+            self.opposite(first + 1) / 3,
+            self.opposite(first + 2) / 3,
+        ]
     }
 
     /// Next half-edge, counter-clockwise around the same triangle.

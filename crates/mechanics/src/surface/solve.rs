@@ -349,6 +349,7 @@ pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions])
             .as_slice()
             .chunks_exact(own.len().max(1))
             .zip(sent)
+            .filter(|(_, force)| *force != 0.0)
         {
             add(&mut own, force, column);
         }
