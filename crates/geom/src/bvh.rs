@@ -90,7 +90,10 @@ impl TriangleBvh {
         Self {
             groups_below: groups_below(&nodes, &groups),
             nodes,
-            corners: items.par_iter().map(|item| mesh.corners(item.face as usize)).collect(),
+            corners: items
+                .par_iter()
+                .map(|item| mesh.corners(item.face as usize))
+                .collect(),
             groups,
             faces: items.iter().map(|item| item.face).collect(),
         }
@@ -355,9 +358,7 @@ fn tree(items: &mut [Item], first: usize, depth: u32) -> Vec<Node> {
 fn leaf(items: &[Item], first: usize) -> Node {
     let shared = items.first().map_or(0, |item| item.group);
     Node {
-        bounds: items
-            .iter()
-            .fold(Aabb::EMPTY, |b, item| b.union(item.bounds)),
+        bounds: items.iter().fold(Aabb::EMPTY, |b, item| b.union(item.bounds)),
         first: first as u32,
         count: items.len() as u32,
         group: if items.iter().all(|item| item.group == shared) {
@@ -448,7 +449,10 @@ fn cheapest_cut(bins: &[(Aabb, usize); N_BINS]) -> Option<usize> {
         Some(*sum)
     };
     let mut right = [(Aabb::EMPTY, 0); N_BINS];
-    let sums = bins.iter().rev().scan((Aabb::EMPTY, 0), |sum, bin| grow(sum, bin));
+    let sums = bins
+        .iter()
+        .rev()
+        .scan((Aabb::EMPTY, 0), |sum, bin| grow(sum, bin));
     for (at, sum) in right.iter_mut().rev().zip(sums) {
         *at = sum;
     }

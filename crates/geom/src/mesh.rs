@@ -18,7 +18,11 @@ impl TriMesh {
     pub fn corners(&self, face: usize) -> [Vec3; 3] {
         // Not by `map`, which is not always compiled into the caller: this is the innermost read of all.
         let [a, b, c] = self.triangles[face];
-        [self.points[a as usize], self.points[b as usize], self.points[c as usize]]
+        [
+            self.points[a as usize],
+            self.points[b as usize],
+            self.points[c as usize],
+        ]
     }
 
     /// Cross product of two edges of `face`: its normal times twice its area.

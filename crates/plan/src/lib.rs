@@ -47,7 +47,7 @@ pub use params::PlanParams;
 pub use piece_set::PieceSet;
 pub use sample::random_plans;
 pub use score::PlanScore;
-pub use search::{MakeCosts, search, search_with};
+pub use search::{MakeCosts, raise_bounds, search, search_with};
 pub use space::score;
 pub use survey::{PlanSurvey, survey};
 pub use types::{

@@ -76,6 +76,42 @@ pub fn search(
     })
 }
 
+/// Raises the bounds of `found`, a plan from a search with a smaller work limit, as far as `params` allow. The
+/// plan stays.
+///
+/// Searches again unless the bounds say that no plan costs less than the cheapest of its pool.
+pub fn raise_bounds(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    survey: &PlanSurvey,
+    constraints: &PlanConstraints,
+    found: &mut FoundPlan,
+) -> Result<(), Cancelled> {
+    let least = found
+        .pool
+        .iter()
+        .map(|p| p.score.worst)
+        .fold(f64::INFINITY, f64::min);
+    if found.lower_bound >= just_below(least) {
+        return Ok(());
+    }
+    // Warnings of this search were given with the plan.
+    if let PlanOutcome::Found(again) = search(&ctx.fork(), params, survey, constraints)?
+        && again.scope == found.scope
+        && again.lower_bound > found.lower_bound
+    {
+        let cost = found.score.worst;
+        found.lower_bound = again.lower_bound.min(cost);
+        found.is_optimal = found.lower_bound >= just_below(cost);
+        let of_key = match again.plan.key() == found.plan.key() {
+            true => again.key_lower_bound,
+            false => found.key_lower_bound,
+        };
+        found.key_lower_bound = of_key.clamp(found.lower_bound, cost);
+    }
+    Ok(())
+}
+
 /// Runs [`search`] with other costs.
 pub fn search_with(
     ctx: &Ctx<'_>,

@@ -450,6 +450,31 @@ fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
     }
 }
 
+#[test]
+fn bounds_that_are_raised_later_are_those_of_a_long_search_and_the_plan_stays() {
+    let survey = run_survey(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let constraints = PlanConstraints::default();
+    let params = |proof_budget| PlanParams {
+        n_plans: 40,
+        proof_budget,
+        ..PlanParams::default()
+    };
+    let found = |proof_budget| match run_search(&params(proof_budget), &survey, &constraints) {
+        PlanOutcome::Found(found) => found,
+        PlanOutcome::Infeasible { reason, .. } => panic!("{reason}"),
+    };
+    let (mut little, much) = (found(200), found(1_000_000));
+    let plan = little.plan.clone();
+    assert!(
+        little.lower_bound < much.lower_bound,
+        "there is something to raise"
+    );
+    on_ctx(|ctx| raise_bounds(ctx, &params(1_000_000), &survey, &constraints, &mut little)).unwrap();
+    assert_eq!(little.plan, plan);
+    assert_eq!(little.lower_bound, much.lower_bound.min(little.score.worst));
+    assert_eq!(little.is_optimal, little.score.worst <= much.score.worst);
+}
+
 /// The default costs through `bound` alone, as another metric would give them.
 pub struct BoundsAlone(pub SeamCosts);
 

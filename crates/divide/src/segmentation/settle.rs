@@ -41,12 +41,18 @@ pub(super) fn settle_seams(
             let is_worn = |side: u32| now[side as usize] < LEAST_KEPT * first[side as usize];
             if pair.into_iter().any(is_worn)
                 || ground.whole.is_parted(moved, pair)
-                || !pair.into_iter().all(|side| is_connected(&ground.topology, moved, side))
+                || !pair
+                    .into_iter()
+                    .all(|side| is_connected(&ground.topology, moved, side))
             {
                 return false;
             }
             // Patches stay connected, so their numbers stay, too.
-            let n_after = n_faults(params, ground, &FaceLabels::of_connected(moved, labels.n_patches()));
+            let n_after = n_faults(
+                params,
+                ground,
+                &FaceLabels::of_connected(moved, labels.n_patches()),
+            );
             n_after <= n_before && {
                 n_before = n_after;
                 true

@@ -326,7 +326,11 @@ fn strongest<'b, T>(
     };
     let mut change_at = |rated: &Rated<'_>, is_early: bool| {
         let (plan, bears) = (&rated.candidate, bears(&foresight.model, bench, rated));
-        change(Stand { plan, bears, is_early })
+        change(Stand {
+            plan,
+            bears,
+            is_early,
+        })
     };
     let mut ascent = match Ascent::begin(ctx, rules, bench, &starts) {
         Ok(ascent) => ascent,

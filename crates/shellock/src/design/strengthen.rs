@@ -129,7 +129,7 @@ mod tests {
     use crate::design::candidate::Candidate;
     use crate::handling::{Deed, Failure};
     use crate::metric::{EvenSurface, GivesWay, RESERVE};
-    use crate::plan::{LatticePlan, RankedPlan, PlanConstraints, PlanScore, survey};
+    use crate::plan::{LatticePlan, PlanConstraints, PlanScore, RankedPlan, survey};
     use crate::strength::Cavity;
 
     const N: usize = 4;
