@@ -68,6 +68,9 @@ pub(super) struct Allowance {
     permits: [Permit; TABLE.len()],
     /// Load factor below which changes are sought.
     pub least_factor: f64,
+    /// True if a hopeless climb may end early for a change. Once the wall was thickened, few changes are left,
+    /// so they must be right.
+    pub may_end_climb: bool,
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
@@ -299,6 +302,7 @@ impl Agenda {
         Allowance {
             permits: TABLE.map(|row| self.permit(ctx, row.step)),
             least_factor: self.least_factor(),
+            may_end_climb: !self.is_wall_thick(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
             kit_reserve_s: self.clock.kit_reserve_s(),
             least_kit_s: self.clock.least_kit_s(),

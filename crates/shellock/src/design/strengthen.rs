@@ -36,6 +36,9 @@ pub(super) fn strengthen(
     allowance: &Allowance,
 ) -> Result<(Vec<Change>, Option<Step>), DesignError> {
     let (division, asked, bears) = (planning.division, allowance.least_factor, &stand.bears);
+    if stand.is_early && !allowance.may_end_climb {
+        return Ok((Vec::new(), None));
+    }
     let [most_gain, gain] = match stand.is_early {
         true => [MOST_GAIN, MEAN_GAIN],
         false => [1.0; 2],
