@@ -76,8 +76,8 @@ pub fn search(
     })
 }
 
-/// Raises the bounds of `found`, a plan from a search with a smaller work limit, as far as `params` allow. The
-/// plan stays.
+/// Raises the bounds of `found`, a plan from a search with a smaller work limit, as far as `params` allow.
+/// The plan stays.
 ///
 /// Searches again unless the bounds say that no plan costs less than the cheapest of its pool.
 pub fn raise_bounds(

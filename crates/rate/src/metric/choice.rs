@@ -212,7 +212,7 @@ pub fn choose(
 pub struct Stand<'a> {
     /// The strongest plan so far.
     pub plan: &'a RankedPlan,
-    /// Its load factors in use.
+    /// Load factors of that plan in use.
     pub bears: Vec<LoadBorne>,
     /// True after the first heat of the climb; false once the uses are climbed.
     pub is_early: bool,

@@ -75,9 +75,9 @@ impl WhatIf<'_> {
         Ok(best)
     }
 
-    /// Finds the thinnest wall up to `most_mm` that is strong enough with connectors of these sizes, or the
-    /// thickest one if that gains something over the expected load factor `before`; `None` if the model is not hollow
-    /// with such a wall.
+    /// Finds the thinnest wall up to `most_mm` that is strong enough with connectors of these sizes. If none
+    /// is, returns the thickest, provided that it gains something over the expected load factor `before`;
+    /// `None` if the model is not hollow with such a wall.
     pub fn thicken(
         &self,
         sizes: &ConnectorSizes,

@@ -68,8 +68,8 @@ pub(super) struct Allowance {
     permits: [Permit; TABLE.len()],
     /// Load factor below which changes are sought.
     pub least_factor: f64,
-    /// True if a hopeless climb may end early for a change. Once the wall was thickened, few changes are left,
-    /// so they must be right.
+    /// True if a hopeless climb may end early for a change. After the wall was thickened, few changes are
+    /// left, so they must be right.
     pub may_end_climb: bool,
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.

@@ -15,8 +15,8 @@ use crate::plan::{FoundPlan, LatticePlan, PlanOutcome, PlanParams};
 use crate::segmentation::join;
 use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 
-/// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves the
-/// optimum of a koala in ten pieces, but not that of a bunny in twelve.
+/// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves
+/// the optimum of a koala in ten pieces, but not that of a bunny in twelve.
 const SHARE_WHILE_PLANNING: usize = 10;
 
 /// Result of an attempt.
