@@ -169,7 +169,7 @@ impl FaceLabels {
         }
     }
 
-    /// Labels as they are, each of which is connected and below `n_patches`.
+    /// Takes labels as they are. Each must be connected and below `n_patches`.
     fn of_connected(label: &[u32], n_patches: usize) -> Self {
         Self {
             patch_of_face: label.to_vec(),
@@ -460,7 +460,8 @@ fn best_contacts(
     limit: f64,
 ) -> Result<Option<(f64, SegmentedSurface)>, SegmentationError> {
     let mut best: Option<(f64, SegmentedSurface)> = None;
-    // Patches whose contacts are longer than any later limit. They would only cost more under it.
+    // Patches whose contacts are longer than any later limit. Under it they would cost more, as only their
+    // seams could settle a little better.
     let mut held: Option<FaceLabels> = None;
     for (i, limit_mm) in contact_limits(params).into_iter().enumerate() {
         let limited = SegmentationParams {

@@ -129,7 +129,7 @@ pub fn climb<'b>(
 /// plan that withstands enough wins, else the strongest one in the end.
 pub(super) struct Ascent<'c, 'b> {
     climber: Climber<'c, 'b>,
-    /// Plans that were reached; true if no move improves one any more.
+    /// Plans that the starts reached, each with true if no move improves it any more.
     runners: Vec<(Rated<'b>, bool)>,
     /// Number of loads that each start may solve in the next heat.
     n_each: usize,

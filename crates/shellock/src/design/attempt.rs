@@ -308,7 +308,8 @@ pub(super) fn next_plan(
         *former = Some(stand.plan.plan.clone());
         match strengthen(ctx, planning, &handling, &stand, allowance) {
             Ok((changes, late_change)) => {
-                late = late.or(late_change);
+                // The climb may still reach what is asked, so an early look rules nothing out.
+                late = late.or(late_change.filter(|_| !stand.is_early));
                 (!changes.is_empty()).then_some(Ok(changes))
             }
             Err(e) => Some(Err(e)),

@@ -47,7 +47,10 @@ pub(super) fn strengthen(
         return Ok((Vec::new(), None));
     };
     let before = gain * factor;
-    ctx.stage("reinforcements", 0)?;
+    // An early look is a part of the climb, which may go on.
+    if !stand.is_early {
+        ctx.stage("reinforcements", 0)?;
+    }
     let rating = WhatIf {
         params: &division.settings.plan,
         even: planning.even,
