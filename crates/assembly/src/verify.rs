@@ -28,7 +28,7 @@ pub mod words;
 use contact::Contact;
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
-pub use thin::{ThinFeature, ThinKind, ThinPoint, ThinShare, thin_places, thin_points, thin_share};
+pub use thin::{ThinFeature, ThinKind, ThinShare, thin_places, thin_share};
 
 use crate::InstallationPlan;
 use crate::PressFit;

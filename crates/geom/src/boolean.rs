@@ -89,35 +89,6 @@ impl Volume {
         }
     }
 
-    /// Region swept by a polygon that moves through `rings`: one closed loft with flat caps. All rings must
-    /// have the same number of points, in the same order, and the loft must not fold back through itself.
-    /// Empty for fewer than two rings, and for rings of fewer than three points.
-    pub fn loft(rings: &[Vec<Vec3>]) -> Self {
-        if rings.len() < 2 || rings[0].len() < 3 {
-            return Self::empty();
-        }
-        let n = rings[0].len() as u32;
-        let mut mesh = TriMesh {
-            points: rings.concat(),
-            triangles: Vec::new(),
-        };
-        for ring in 0..rings.len() as u32 - 1 {
-            for i in 0..n {
-                let (a, b) = (ring * n + i, ring * n + (i + 1) % n);
-                mesh.triangles.extend([[a, b, b + n], [a, b + n, a + n]]);
-            }
-        }
-        let last = (rings.len() as u32 - 1) * n;
-        for i in 2..n {
-            mesh.triangles.push([0, i, i - 1]);
-            mesh.triangles.push([last, last + i - 1, last + i]);
-        }
-        if mesh.signed_volume() < 0.0 {
-            mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-        }
-        Self::from_closed_mesh(&mesh).unwrap_or_else(|_| Self::empty())
-    }
-
     /// Box from `b.min` to `b.max`.
     pub fn cuboid(b: Aabb) -> Self {
         Self(Manifold::cube(v(b.size()), false).translate(v(b.min)))
@@ -518,21 +489,6 @@ mod tests {
         assert!((both.retain(|mut p| Iterator::all(&mut p, |p| p.x < 3.0)).volume() - 1.0).abs() < 1e-12);
         assert!((both.retain(|_| true).volume() - 9.0).abs() < 1e-12);
         assert!(both.retain(|_| false).is_empty());
-    }
-
-    #[test]
-    fn a_loft_of_a_square_is_a_box() {
-        let ring = |x: f64| {
-            [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)]
-                .map(|(y, z)| Vec3::new(x, y, z))
-                .to_vec()
-        };
-        for rings in [
-            [ring(0.0), ring(1.0), ring(3.0)],
-            [ring(3.0), ring(1.0), ring(0.0)],
-        ] {
-            assert!((Volume::loft(&rings).volume() - 6.0).abs() < 1e-12);
-        }
     }
 
     /// Threads make volumes in any order, which must not show in the mesh.

@@ -14,6 +14,7 @@ pub mod grown;
 pub mod hollow;
 pub mod laplacian;
 pub mod level_cut;
+mod loft;
 pub mod marching_cubes;
 pub mod mesh;
 pub mod polygon;

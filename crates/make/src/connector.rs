@@ -22,13 +22,16 @@
 
 mod frame;
 mod free;
+mod outline;
 mod profile;
 mod rail;
 mod run;
 mod station;
+mod taken;
 
 pub use frame::{Curve, curves};
 pub use free::is_unobstructed;
+pub(crate) use outline::{Half, whole_half};
 pub use profile::{ProfileRect, Section};
 pub(crate) use rail::{rail_places, stop_mm};
 pub use run::{SeamRoom, runs};
@@ -60,7 +63,8 @@ pub struct ConnectorParams {
     /// Interference of the ribs of a key without rails with the pieces around it: only friction holds such a
     /// key. [0, 0.3]; 0.08.
     pub key_rib_mm: f64,
-    /// Thinnest wall that is kept. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
+    /// Least thickness of the walls of rails; thinner places of pieces are reported. [0.1, 2]; 0.4, one
+    /// extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
 

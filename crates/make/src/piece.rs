@@ -11,7 +11,6 @@ mod key_parts;
 mod label;
 mod relief;
 mod ribs;
-mod thin;
 
 pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
 pub use key_parts::Grip;
@@ -20,9 +19,9 @@ pub use relief::Relief;
 pub use shellock_assembly::{PressFit, PressFitKind};
 use shellock_geom::Volume;
 
-use crate::connector::{ConnectorParams, Run};
+use crate::connector::{ConnectorParams, Half, Run, whole_half};
 
 /// The male and the female half of a run, before carving.
 pub(crate) fn whole_halves(params: &ConnectorParams, run: &Run) -> [Volume; 2] {
-    [carve::Half::Male, carve::Half::Female].map(|half| carve::whole_half(params, run, half))
+    [Half::Male, Half::Female].map(|half| whole_half(params, run, half))
 }

@@ -111,7 +111,7 @@ pub struct ThinFeature {
 /// face that is parallel within 15°, the point is thin. Thin points of one kind less than 1.2 mm apart form
 /// one place.
 pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinFeature> {
-    let all = thin_points(mesh, [least_wall_mm, least_slot_mm], &|_| true);
+    let all = thin_points(mesh, [least_wall_mm, least_slot_mm]);
     let mut places: Vec<ThinFeature> = all.iter().map(|members| feature(members)).collect();
     places.sort_by(|a, b| b.length_mm.total_cmp(&a.length_mm));
     places
@@ -119,32 +119,21 @@ pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Ve
 
 /// Point of the surface across which a piece is thin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ThinPoint {
-    /// Kind of the feature: sheet or slot.
-    pub kind: ThinKind,
-    /// Position of the point, mm.
-    pub at: Vec3,
-    /// Unit vector across the sheet or the slot.
-    pub across: Vec3,
+struct ThinPoint {
+    kind: ThinKind,
+    at: Vec3,
     /// Distance to the other side, mm.
-    pub thickness_mm: f64,
+    thickness_mm: f64,
 }
 
-/// Finds the points of the sheets and slots that [`thin_places`] reports, for given limits (mm, 0 for none),
-/// among those that `counts` accepts. The order is arbitrary, but equal for equal meshes.
-pub fn thin_points(
-    mesh: &TriMesh,
-    limits_mm: [f64; 2],
-    counts: &(dyn Fn(Vec3) -> bool + Sync),
-) -> Vec<Vec<ThinPoint>> {
+/// Finds the points of the sheets and slots that [`thin_places`] reports, for given limits (mm, 0 for none).
+/// The order is arbitrary, but equal for equal meshes.
+fn thin_points(mesh: &TriMesh, limits_mm: [f64; 2]) -> Vec<Vec<ThinPoint>> {
     let n = ((mesh.area() * RAYS_PER_MM2) as usize).min(MOST_RAYS);
     if n == 0 {
         return Vec::new();
     }
-    let samples: Vec<Sample> = sample::on_surface(mesh, n, SEED)
-        .into_par_iter()
-        .filter(|s| counts(s.point))
-        .collect();
+    let samples = sample::on_surface(mesh, n, SEED);
     let bvh = TriangleBvh::new(mesh);
     let found = |kind: ThinKind, sense: f64, limit_mm: f64| {
         let point = |s: &Sample| {
@@ -155,7 +144,6 @@ pub fn thin_points(
             (opposed >= COS_SHEET && on_mm > 10.0 * START_MM).then_some(ThinPoint {
                 kind,
                 at: s.point,
-                across,
                 thickness_mm: on_mm + START_MM,
             })
         };

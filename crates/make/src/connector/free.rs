@@ -9,8 +9,10 @@ use super::profile::{ProfileRect, Section};
 use super::station::RunStation;
 use crate::body::{ShellBodies, ShellGrid};
 
-/// Least share of a section's sample points that must be free for a connector to be worth making there.
-const LEAST_FREE: f64 = 0.6;
+/// Points a side of each part of a section that must be free, and their distance from the part's sides, as a
+/// share of its width: sampled fields round off the edges of walls.
+const N_ACROSS: usize = 5;
+const FROM_SIDE: f64 = 0.16;
 
 /// Returns a test of a piece and a point: `None` in or above the wall, else true if connectors of the piece
 /// may be there. The point must be clear of its way out and of later pieces' ways, by the clearance.
@@ -37,7 +39,7 @@ pub fn is_unobstructed<'a>(
     }
 }
 
-/// Returns true if both halves have room for most of their section.
+/// Returns true if both halves have room for their whole section, as far as it lies below the wall.
 pub(super) fn has_room(
     params: &ConnectorParams,
     station: &RunStation,
@@ -47,18 +49,20 @@ pub(super) fn has_room(
 ) -> bool {
     let section = Section::at(params, station);
     let halves: [(PatchId, &[Option<ProfileRect>]); 2] = [(male, &section.male), (female, &section.female)];
+    let share = |i: usize| FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
+    let between = |from: f64, to: f64, i: usize| from + (to - from) * share(i);
     halves.iter().all(|(piece, parts)| {
-        let (mut free, mut all) = (0.0, 0.0);
-        for part in parts.iter().flatten() {
-            for (a, b) in (0..9).map(|i| (f64::from(i % 3), f64::from(i / 3))) {
-                let n = part.n0 + (part.n1 - part.n0) * (0.5 + a) / 3.0;
-                let s = part.s0 + (part.s1 - part.s0) * (0.5 + b) / 3.0;
-                if let Some(ok) = is_free(*piece, station.point + n * station.n + s * station.s) {
-                    all += 1.0;
-                    free += f64::from(u8::from(ok));
-                }
-            }
-        }
-        all > 0.0 && free >= LEAST_FREE * all
+        let mut is_below = false;
+        let places = parts.iter().flatten().flat_map(|part| {
+            (0..N_ACROSS * N_ACROSS).map(|i| {
+                let n = between(part.n0, part.n1, i % N_ACROSS);
+                station.place(n, between(part.s0, part.s1, i / N_ACROSS))
+            })
+        });
+        let is_whole = places.filter_map(|at| is_free(*piece, at)).all(|is_free| {
+            is_below = true;
+            is_free
+        });
+        is_whole && is_below
     })
 }

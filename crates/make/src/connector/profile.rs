@@ -38,7 +38,7 @@ impl ProfileRect {
             (self.n1, self.s1),
             (self.n0, self.s1),
         ]
-        .map(|(n, s)| at.point + n * at.n + s * at.s)
+        .map(|(n, s)| at.place(n, s))
     }
 }
 
@@ -75,6 +75,23 @@ impl Section {
             RunShape::Seam => Self::seam(station),
             RunShape::Rail(part) => Self::rail(params, station, part),
         }
+    }
+
+    /// Rectangle around all parts.
+    pub fn bounds(&self) -> ProfileRect {
+        let empty = ProfileRect {
+            n0: f64::INFINITY,
+            n1: f64::NEG_INFINITY,
+            s0: f64::INFINITY,
+            s1: f64::NEG_INFINITY,
+        };
+        let parts = self.male.iter().chain(&self.female).flatten();
+        parts.fold(empty, |all, part| ProfileRect {
+            n0: all.n0.min(part.n0),
+            n1: all.n1.max(part.n1),
+            s0: all.s0.min(part.s0),
+            s1: all.s1.max(part.s1),
+        })
     }
 
     /// Cross-section of a rail: a tongue of the male under the female's wall, and the female's groove around

@@ -12,13 +12,23 @@ use shellock_surface::seam::rules::{
 use super::ConnectorParams;
 use super::frame::Curve;
 use super::free::has_room;
+use super::profile::Section;
 use super::rail::rails;
 use super::station::{Run, RunShape, RunStation};
+use super::taken::Taken;
 
 /// Limits of a run's cell: deviation from the curve, mm, turn, rad, and length, mm.
 const CELL_SAG_MM: f64 = 0.03;
 const CELL_TURN: f64 = 0.12;
 const CELL_LENGTH_MM: f64 = 6.0;
+
+/// Sizes to which a section may shrink where its full size has no room: least share of the full size, least
+/// size, mm, and number of sizes that are tried.
+const LEAST_SHARE: f64 = 0.5;
+const LEAST_SIZE_MM: f64 = 2.0;
+const N_SIZES: usize = 6;
+/// Greatest change of the size along the seam, mm per mm.
+const MOST_WIDENING: f64 = 0.25;
 
 /// Room for connectors on a seam between two pieces.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +48,8 @@ pub struct SeamRoom {
 /// Runs along all curves, and the room of each curve. `is_free(piece, point)` is true where `piece` may have
 /// material at a point below the wall; `None` where the point lies in or above the wall and does not count.
 /// `slide` is the key's direction where it slides on rails.
+///
+/// Seams of pieces that leave first come first. Later ones keep out of the way of their connectors.
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
@@ -46,55 +58,104 @@ pub fn runs(
     slide: Option<Vec3>,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
 ) -> (Vec<Run>, Vec<SeamRoom>) {
-    let (mut runs, mut contacts) = (Vec::new(), Vec::new());
-    for curve in curves {
+    let mut order: Vec<&Curve> = curves.iter().collect();
+    order.sort_by_key(|curve| std::cmp::Reverse(plan.position(curve.later)));
+    let mut taken = Taken::none(plan);
+    let (mut runs, mut rooms) = (Vec::new(), Vec::new());
+    for curve in order {
+        let is_free = |piece: PatchId, point: Vec3| {
+            is_free(piece, point).map(|is_free| is_free && taken.leaves_free(piece, point))
+        };
+        let size_mm = sizes.of(curve.later, curve.earlier);
+        let slides = slide.is_some() && curve.later == plan.key();
+        let line = Line::along(curve, plan, size_mm, params.clearance_of(slides));
+        let mut room = line.room();
+        let mut made = Vec::new();
+        if let Some(slide) = slide.filter(|_| slides) {
+            let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, &is_free);
+            made.extend(rails);
+            room.usable_mm += usable_mm;
+        }
+        made.extend(line.runs(params, &is_free));
+        made.iter().for_each(|run| taken.add(params, run));
+        runs.extend(made);
+        rooms.push(room);
+    }
+    (runs, rooms)
+}
+
+/// A curve with the section that a connector would have at each of its points.
+struct Line<'a> {
+    curve: &'a Curve,
+    stations: Vec<RunStation>,
+    /// True where the later piece carries the pin.
+    later_is_male: Vec<bool>,
+    /// True where ends, roles, angles and turns allow a connector.
+    allowed: Vec<bool>,
+}
+
+impl<'a> Line<'a> {
+    fn along(curve: &'a Curve, plan: &LatticePlan, size_mm: f64, clearance_mm: f64) -> Self {
         let separation = plan.separation(curve.later).unit();
         let later_is_male = roles(curve, separation);
-        let size_mm = sizes.of(curve.later, curve.earlier);
-        let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
         let at = |i: usize| RunStation {
             clearance_mm,
             ..station(curve, i, separation, later_is_male[i], size_mm)
         };
         let stations: Vec<RunStation> = (0..curve.points.len()).map(at).collect();
-        let mut allowed = connector_mask(size_mm, curve, &stations, &later_is_male);
-        let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
-        contacts.push(SeamRoom {
-            later: curve.later,
-            earlier: curve.earlier,
-            length_mm: (0..stations.len() - 1).map(step).sum(),
-            usable_mm: (0..stations.len() - 1)
-                .filter(|&i| allowed[i] && allowed[i + 1])
+        let allowed = connector_mask(size_mm, curve, &stations, &later_is_male);
+        Self {
+            curve,
+            stations,
+            later_is_male,
+            allowed,
+        }
+    }
+
+    fn room(&self) -> SeamRoom {
+        let step = |i: usize| self.stations[i].point.distance(self.stations[i + 1].point);
+        let steps = 0..self.stations.len() - 1;
+        SeamRoom {
+            later: self.curve.later,
+            earlier: self.curve.earlier,
+            length_mm: steps.clone().map(step).sum(),
+            usable_mm: steps
+                .filter(|&i| self.allowed[i] && self.allowed[i + 1])
                 .map(step)
                 .sum(),
-            at: curve.points[curve.points.len() / 2],
-        });
-        if let Some(slide) = slide.filter(|_| curve.later == plan.key()) {
-            let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, is_free);
-            runs.extend(rails);
-            contacts
-                .iter_mut()
-                .last()
-                .into_iter()
-                .for_each(|c| c.usable_mm += usable_mm);
+            at: self.curve.points[self.curve.points.len() / 2],
         }
-        for i in 0..stations.len() {
-            let (male, female) = sides(curve, later_is_male[i]);
-            allowed[i] = allowed[i] && has_room(params, &stations[i], male, female, is_free);
+    }
+
+    /// Runs on the stretches where the whole section has room.
+    fn runs(mut self, params: &ConnectorParams, is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>) -> Vec<Run> {
+        let has_room = |i: usize, station: &RunStation| {
+            let (male, female) = sides(self.curve, self.later_is_male[i]);
+            has_room(params, station, male, female, is_free)
+        };
+        fit_sizes(&mut self.stations, &mut self.allowed, &has_room);
+        // A run ends where the seam bends more tightly than the section is wide.
+        for i in 1..self.stations.len() {
+            if cross(params, &self.stations[i - 1], &self.stations[i]) {
+                self.allowed[i - 1] = false;
+                self.allowed[i] = false;
+            }
         }
-        for (from, to) in stretches(&allowed, &later_is_male) {
-            let run = thin_out(&stations[from..=to]);
-            let (male, female) = sides(curve, later_is_male[from]);
-            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN_SIZES * size_mm {
+        let mut runs = Vec::new();
+        for (from, to) in stretches(&self.allowed, &self.later_is_male) {
+            let stretch = &self.stations[from..=to];
+            let (male, female) = sides(self.curve, self.later_is_male[from]);
+            let least_mm = stretch.iter().map(|at| at.size_mm).fold(f64::INFINITY, f64::min);
+            if stretch[stretch.len() - 1].arc_mm - stretch[0].arc_mm >= SHORTEST_RUN_SIZES * least_mm {
                 runs.push(Run {
                     male,
                     female,
-                    stations: run,
+                    stations: thin_out(params, stretch),
                 });
             }
         }
+        runs
     }
-    (runs, contacts)
 }
 
 fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
@@ -180,8 +241,61 @@ fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Selects as few stations as possible whose cells keep the limits of sag, turn and length.
-fn thin_out(stations: &[RunStation]) -> Vec<RunStation> {
+/// Gives each allowed station the greatest size, up to its own, with which its whole section has room. Sizes
+/// change gently along the seam: a run narrows past an obstacle. Where no size has room, the station is no
+/// longer allowed.
+fn fit_sizes(
+    stations: &mut [RunStation],
+    allowed: &mut [bool],
+    has_room: &dyn Fn(usize, &RunStation) -> bool,
+) {
+    let sized = |at: &RunStation, size_mm: f64| RunStation { size_mm, ..*at };
+    for i in 0..stations.len() {
+        let full_mm = stations[i].size_mm;
+        let least_mm = (LEAST_SHARE * full_mm).max(LEAST_SIZE_MM).min(full_mm);
+        let step_mm = (full_mm - least_mm) / (N_SIZES - 1) as f64;
+        let fits = |k: usize| {
+            let station = sized(&stations[i], full_mm - k as f64 * step_mm);
+            has_room(i, &station).then_some(station)
+        };
+        let n_sizes = if step_mm > 0.0 { N_SIZES } else { 1 };
+        match (0..n_sizes).find_map(fits).filter(|_| allowed[i]) {
+            Some(station) => stations[i] = station,
+            None => allowed[i] = false,
+        }
+    }
+    let wide = stations.to_vec();
+    for i in (0..stations.len()).filter(|&i| allowed[i]) {
+        let limit_mm = |j: usize| wide[j].size_mm + MOST_WIDENING * (wide[j].arc_mm - wide[i].arc_mm).abs();
+        let onwards = (i..wide.len()).take_while(|&j| allowed[j]);
+        let backwards = (0..i).rev().take_while(|&j| allowed[j]);
+        let size_mm = onwards
+            .chain(backwards)
+            .map(limit_mm)
+            .fold(f64::INFINITY, f64::min);
+        stations[i] = sized(&stations[i], size_mm);
+    }
+    for i in 0..stations.len() {
+        allowed[i] = allowed[i] && (stations[i] == wide[i] || has_room(i, &stations[i]));
+    }
+}
+
+/// Returns true if the sections at two successive stations meet: a corner of one is not on its own side of
+/// the plane of the other.
+fn cross(params: &ConnectorParams, a: &RunStation, b: &RunStation) -> bool {
+    let outer = |at: &RunStation| Section::at(params, at).bounds().corners(at);
+    let forward = |at: &RunStation| {
+        let normal = at.n.cross(at.s);
+        normal * normal.dot(at.tangent).signum()
+    };
+    let is_ahead = outer(b).iter().all(|p| (*p - a.point).dot(forward(a)) > 0.0);
+    let is_behind = outer(a).iter().all(|p| (*p - b.point).dot(forward(b)) < 0.0);
+    !(is_ahead && is_behind)
+}
+
+/// Selects as few stations as possible whose cells keep the limits of sag, turn and length, and whose
+/// sections do not meet.
+fn thin_out(params: &ConnectorParams, stations: &[RunStation]) -> Vec<RunStation> {
     let mut kept = vec![stations[0]];
     let mut from = 0;
     for to in 2..stations.len() {
@@ -192,7 +306,12 @@ fn thin_out(stations: &[RunStation]) -> Vec<RunStation> {
             (off - off.dot(chord) * chord).length() > CELL_SAG_MM
         });
         let turns = a.n.dot(b.n) < CELL_TURN.cos() || (a.theta - b.theta).abs() > CELL_TURN;
-        if sags || turns || b.arc_mm - a.arc_mm > CELL_LENGTH_MM {
+        let is_long = b.arc_mm - a.arc_mm > CELL_LENGTH_MM;
+        let narrows = stations[from + 1..to].iter().any(|s| {
+            let share = (s.arc_mm - a.arc_mm) / (b.arc_mm - a.arc_mm);
+            (s.size_mm - a.size_mm - share * (b.size_mm - a.size_mm)).abs() > CELL_SAG_MM
+        });
+        if sags || turns || narrows || is_long || cross(params, a, b) {
             from = to - 1;
             kept.push(stations[from]);
         }

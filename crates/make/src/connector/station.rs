@@ -60,7 +60,19 @@ pub struct Run {
     pub stations: Vec<RunStation>,
 }
 
+impl RunStation {
+    /// The point at coordinates along `n` and ŝ, mm.
+    pub fn place(&self, n: f64, s: f64) -> Vec3 {
+        self.point + n * self.n + s * self.s
+    }
+}
+
 impl Run {
+    /// Returns true if the run closes on itself: its last station is its first.
+    pub fn is_loop(&self) -> bool {
+        self.stations.len() > 2 && self.stations[0].point == self.stations[self.stations.len() - 1].point
+    }
+
     /// Length along the seam, mm.
     pub fn length(&self) -> f64 {
         self.stations

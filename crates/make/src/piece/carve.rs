@@ -1,64 +1,44 @@
-//! Half connectors as volumes, and the swept volumes that are carved from them.
+//! Swept volumes of half connectors, which are carved from other pieces.
 
 use rayon::prelude::*;
 use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Vec3, Volume};
 use shellock_report::PatchId;
 
-use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section};
+use crate::connector::{ConnectorParams, Half, ProfileRect, Run, RunStation, Section};
 
 /// Difference between the clearance and the growth of the socket, mm. The channel's section already keeps the
 /// clearance; the difference keeps faces from coinciding.
 const SOCKET_SLACK_MM: f64 = 0.01;
 
-/// One half of a run, or the filling of the corner between tongue and wall.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Half {
-    Male,
-    Female,
-    Corner,
-}
-
 /// The corners of one convex cell of a run.
 type Cell = [Vec3; 8];
 
-/// Corners of each part of one half's section, station by station. Every part is grown by `grown_mm` on all
-/// sides, lengthwise at the run's ends.
-fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Vec<Option<[Vec3; 4]>>> {
-    let last = run.stations.len() - 1;
-    run.stations
-        .iter()
-        .enumerate()
-        .map(|(i, station)| {
-            let section = Section::at(params, station);
-            let parts = match half {
-                Half::Male => section.male.to_vec(),
-                Half::Female => section.female.to_vec(),
-                Half::Corner => vec![section.corner],
-            };
-            let lengthwise = if i == 0 {
-                -grown_mm
-            } else if i == last {
-                grown_mm
-            } else {
-                0.0
-            };
-            let moved = RunStation {
-                point: station.point + lengthwise * station.tangent,
-                ..*station
-            };
-            parts
-                .into_iter()
-                .map(|part: Option<ProfileRect>| part.map(|p| p.grown(grown_mm).corners(&moved)))
-                .collect()
-        })
-        .collect()
-}
-
 /// Convex cells of one half, grown by `grown_mm`: one for each part of the section between two stations.
+/// Every part grows on all sides, lengthwise at the run's ends.
 fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
+    let last = run.stations.len() - 1;
+    let ring = |(i, station): (usize, &RunStation)| {
+        let section = Section::at(params, station);
+        let lengthwise = match i {
+            0 => -grown_mm,
+            i if i == last => grown_mm,
+            _ => 0.0,
+        };
+        let moved = RunStation {
+            point: station.point + lengthwise * station.tangent,
+            ..*station
+        };
+        let corners = |part: &Option<ProfileRect>| part.map(|p| p.grown(grown_mm).corners(&moved));
+        match half {
+            Half::Male => section.male.iter().map(corners).collect(),
+            Half::Female => section.female.iter().map(corners).collect(),
+            Half::Corner => vec![corners(&section.corner)],
+        }
+    };
+    let rings: Vec<Vec<Option<[Vec3; 4]>>> = run.stations.iter().enumerate().map(ring).collect();
     let mut cells = Vec::new();
-    for pair in rings(params, run, half, grown_mm).windows(2) {
+    for pair in rings.windows(2) {
         for (a, b) in pair[0].iter().zip(&pair[1]) {
             if let (Some(a), Some(b)) = (a, b) {
                 cells.push([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]);
@@ -66,22 +46,6 @@ fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
         }
     }
     cells
-}
-
-/// One half of a run, before carving.
-pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Volume {
-    let rings = rings(params, run, half, 0.0);
-    let n_parts = rings[0].len();
-    let lofts = (0..n_parts).flat_map(|part| {
-        // A part that some sections lack becomes several lofts.
-        let line: Vec<Option<[Vec3; 4]>> = rings.iter().map(|r| r[part]).collect();
-        let stretches: Vec<Volume> = line
-            .split(Option::is_none)
-            .map(|stretch| Volume::loft(&stretch.iter().flatten().map(|c| c.to_vec()).collect::<Vec<_>>()))
-            .collect();
-        stretches
-    });
-    Volume::union_all(lofts.collect())
 }
 
 /// Swept volume of a piece's half connectors on its way out.

@@ -12,14 +12,13 @@ use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
 use shellock_surface::Turn;
 
-use super::carve::{Half, SweptVolume, subtract_sweeps, whole_half};
+use super::carve::{SweptVolume, subtract_sweeps};
 use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
-use super::thin;
 use crate::body::{ShellBodies, ShellGrid};
-use crate::connector::{ConnectorParams, Run, RunStation, Section};
+use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_half};
 
 /// Depth to which connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
@@ -124,9 +123,7 @@ pub fn make(
         .collect();
     ctx.stage("pieces", plan.steps.len())?;
     let mut pieces = unite(shell, &joints, &halves);
-    let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
     relieve(ctx, &finish.relief, plan, &mut pieces)?;
-    thin::shave(ctx, params.min_wall_mm, &depth, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
     changes.extend(
         finish
@@ -300,8 +297,7 @@ impl<'a> Room<'a> {
         };
         let n = 0.5 * (tongue.n0 + tongue.n1);
         let is_free = |s: f64| {
-            let place = station.point + n * station.n + s * station.s;
-            let blocked = self.grid.band.sample(&self.keep_out, place);
+            let blocked = self.grid.band.sample(&self.keep_out, station.place(n, s));
             blocked.is_some_and(|by| by < -f64::from(self.clearance_mm))
         };
         [0.5, 0.25, -0.25]
