@@ -39,30 +39,39 @@ pub fn is_unobstructed<'a>(
     }
 }
 
-/// Returns true if both halves have room for their whole section, as far as it lies below the wall.
+/// Share of a section that must be free where connectors are carved to the room that they have.
+pub(super) const MOST_OF_IT: f64 = 0.6;
+/// Share of a section that must be free where it stays whole.
+pub(super) const ALL_OF_IT: f64 = 1.0;
+
+/// Returns true if both halves have room for at least `share` of their section, as far as it lies below the
+/// wall.
 pub(super) fn has_room(
     params: &ConnectorParams,
     station: &RunStation,
     male: PatchId,
     female: PatchId,
+    share: f64,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
 ) -> bool {
     let section = Section::at(params, station);
     let halves: [(PatchId, &[Option<ProfileRect>]); 2] = [(male, &section.male), (female, &section.female)];
-    let share = |i: usize| FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
-    let between = |from: f64, to: f64, i: usize| from + (to - from) * share(i);
+    let between = |from: f64, to: f64, i: usize| {
+        let at = FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
+        from + (to - from) * at
+    };
     halves.iter().all(|(piece, parts)| {
-        let mut is_below = false;
         let places = parts.iter().flatten().flat_map(|part| {
             (0..N_ACROSS * N_ACROSS).map(|i| {
                 let n = between(part.n0, part.n1, i % N_ACROSS);
                 station.place(n, between(part.s0, part.s1, i / N_ACROSS))
             })
         });
-        let is_whole = places.filter_map(|at| is_free(*piece, at)).all(|is_free| {
-            is_below = true;
-            is_free
-        });
-        is_whole && is_below
+        let (n_free, n) = places
+            .filter_map(|at| is_free(*piece, at))
+            .fold((0, 0), |(n_free, n), is_free| {
+                (n_free + u32::from(is_free), n + 1)
+            });
+        n > 0 && f64::from(n_free) >= share * f64::from(n)
     })
 }

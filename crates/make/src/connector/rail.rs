@@ -9,7 +9,7 @@ use shellock_surface::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, SHORTEST_RA
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::free::has_room;
+use super::free::{MOST_OF_IT, has_room};
 use super::station::{RailPart, Run, RunShape, RunStation};
 
 /// Greatest deviation of the seam from a straight line, across, and of the wall's inner side, up and down, in
@@ -198,7 +198,16 @@ fn rail(
     };
     let arc = |i: usize| length_mm * i as f64 / N_PLACES as f64;
     let free: Vec<bool> = (0..=N_PLACES)
-        .map(|i| has_room(params, &station(arc(i), RailPart::Full), male, female, is_free))
+        .map(|i| {
+            has_room(
+                params,
+                &station(arc(i), RailPart::Full),
+                male,
+                female,
+                MOST_OF_IT,
+                is_free,
+            )
+        })
         .collect();
     let (from, to) = longest(&free)?;
     let (start, end) = (arc(from), arc(to));
@@ -207,7 +216,7 @@ fn rail(
     }
     let places = rail_places([start, end], size_mm, clearance_mm);
     let (stop_mm, stop) = places[4];
-    let has_stop = has_room(params, &station(stop_mm, stop), male, female, is_free);
+    let has_stop = has_room(params, &station(stop_mm, stop), male, female, MOST_OF_IT, is_free);
     let made = places.into_iter().take(if has_stop { 5 } else { 3 });
     let stations = made.map(|(arc_mm, part)| station(arc_mm, part)).collect();
     Some(Run {

@@ -11,7 +11,7 @@ use shellock_surface::seam::rules::{
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::free::has_room;
+use super::free::{ALL_OF_IT, MOST_OF_IT, has_room};
 use super::profile::Section;
 use super::rail::rails;
 use super::station::{Run, RunShape, RunStation};
@@ -127,23 +127,38 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Runs on the stretches where the whole section has room.
-    fn runs(mut self, params: &ConnectorParams, is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>) -> Vec<Run> {
+    /// Runs on the stretches where the whole section has room. A seam that has none such gets runs where most
+    /// of the section has room; carving removes the rest of them.
+    fn runs(&self, params: &ConnectorParams, is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>) -> Vec<Run> {
+        let whole = self.runs_with(params, ALL_OF_IT, is_free);
+        if whole.is_empty() {
+            return self.runs_with(params, MOST_OF_IT, is_free);
+        }
+        whole
+    }
+
+    fn runs_with(
+        &self,
+        params: &ConnectorParams,
+        share: f64,
+        is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
+    ) -> Vec<Run> {
         let has_room = |i: usize, station: &RunStation| {
             let (male, female) = sides(self.curve, self.later_is_male[i]);
-            has_room(params, station, male, female, is_free)
+            has_room(params, station, male, female, share, is_free)
         };
-        fit_sizes(&mut self.stations, &mut self.allowed, &has_room);
+        let (mut stations, mut allowed) = (self.stations.clone(), self.allowed.clone());
+        fit_sizes(&mut stations, &mut allowed, &has_room);
         // A run ends where the seam bends more tightly than the section is wide.
-        for i in 1..self.stations.len() {
-            if cross(params, &self.stations[i - 1], &self.stations[i]) {
-                self.allowed[i - 1] = false;
-                self.allowed[i] = false;
+        for i in 1..stations.len() {
+            if cross(params, &stations[i - 1], &stations[i]) {
+                allowed[i - 1] = false;
+                allowed[i] = false;
             }
         }
         let mut runs = Vec::new();
-        for (from, to) in stretches(&self.allowed, &self.later_is_male) {
-            let stretch = &self.stations[from..=to];
+        for (from, to) in stretches(&allowed, &self.later_is_male) {
+            let stretch = &stations[from..=to];
             let (male, female) = sides(self.curve, self.later_is_male[from]);
             let least_mm = stretch.iter().map(|at| at.size_mm).fold(f64::INFINITY, f64::min);
             if stretch[stretch.len() - 1].arc_mm - stretch[0].arc_mm >= SHORTEST_RUN_SIZES * least_mm {
