@@ -327,4 +327,21 @@ mod tests {
             );
         }
     }
+
+    /// Sections that lean along the seam end in a plane across it, not in an edge beyond it.
+    #[test]
+    fn the_ends_of_a_leaning_run_stand_across_the_seam() {
+        let params = ConnectorParams::default();
+        let at = |x: f64| RunStation {
+            s: Vec3::new(-0.6, 0.0, 0.8),
+            depth: 0.8,
+            ..station(x * Vec3::X, Vec3::X, 0.0)
+        };
+        let leaning = run((0..=10).map(|i| at(f64::from(i))).collect());
+        for half in [Half::Male, Half::Female] {
+            let bounds = whole_half(&params, &leaning, half).bounds();
+            // The lower end leans towards x, the upper one away from it.
+            assert!(bounds.max.x < 10.0 + 1e-9 && bounds.min.x > -1e-9, "{bounds:?}");
+        }
+    }
 }

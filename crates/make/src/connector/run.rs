@@ -63,7 +63,7 @@ pub fn runs(
     let mut taken = Taken::none(plan);
     let (mut runs, mut rooms) = (Vec::new(), Vec::new());
     for curve in order {
-        let is_free = |piece: PatchId, point: Vec3| {
+        let is_clear = |piece: PatchId, point: Vec3| {
             is_free(piece, point).map(|is_free| is_free && taken.leaves_free(piece, point))
         };
         let size_mm = sizes.of(curve.later, curve.earlier);
@@ -72,11 +72,11 @@ pub fn runs(
         let mut room = line.room();
         let mut made = Vec::new();
         if let Some(slide) = slide.filter(|_| slides) {
-            let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, &is_free);
+            let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, is_free);
             made.extend(rails);
             room.usable_mm += usable_mm;
         }
-        made.extend(line.runs(params, &is_free));
+        made.extend(line.runs(params, &is_clear, is_free));
         made.iter().for_each(|run| taken.add(params, run));
         runs.extend(made);
         rooms.push(room);
@@ -127,10 +127,15 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Runs on the stretches where the whole section has room. A seam that has none such gets runs where most
-    /// of the section has room; carving removes the rest of them.
-    fn runs(&self, params: &ConnectorParams, is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>) -> Vec<Run> {
-        let whole = self.runs_with(params, ALL_OF_IT, is_free);
+    /// Runs on the stretches where the whole section is clear of walls and of other connectors. A seam that
+    /// has none such gets runs where most of the section is free of walls; carving removes the rest of them.
+    fn runs(
+        &self,
+        params: &ConnectorParams,
+        is_clear: &dyn Fn(PatchId, Vec3) -> Option<bool>,
+        is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
+    ) -> Vec<Run> {
+        let whole = self.runs_with(params, ALL_OF_IT, is_clear);
         if whole.is_empty() {
             return self.runs_with(params, MOST_OF_IT, is_free);
         }
@@ -143,13 +148,20 @@ impl<'a> Line<'a> {
         share: f64,
         is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
     ) -> Vec<Run> {
+        let at = |i: usize, size_mm: f64| RunStation {
+            size_mm,
+            ..self.stations[i]
+        };
         let has_room = |i: usize, station: &RunStation| {
             let (male, female) = sides(self.curve, self.later_is_male[i]);
-            has_room(params, station, male, female, share, is_free)
+            let crosses_before = i > 0 && cross(params, &at(i - 1, station.size_mm), station);
+            let last = self.stations.len() - 1;
+            let crosses_after = i < last && cross(params, station, &at(i + 1, station.size_mm));
+            !crosses_before && !crosses_after && has_room(params, station, male, female, share, is_free)
         };
         let (mut stations, mut allowed) = (self.stations.clone(), self.allowed.clone());
         fit_sizes(&mut stations, &mut allowed, &has_room);
-        // A run ends where the seam bends more tightly than the section is wide.
+        // Where sizes differ, neighbours can still cross.
         for i in 1..stations.len() {
             if cross(params, &stations[i - 1], &stations[i]) {
                 allowed[i - 1] = false;
@@ -256,9 +268,9 @@ fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Gives each allowed station the greatest size, up to its own, with which its whole section has room. Sizes
-/// change gently along the seam: a run narrows past an obstacle. Where no size has room, the station is no
-/// longer allowed.
+/// Gives each allowed station the greatest size, up to its own, with which its section has room. Sizes change
+/// gently along the seam: a run narrows past an obstacle and in a tight bend. Where no size has room, the
+/// station is no longer allowed.
 fn fit_sizes(
     stations: &mut [RunStation],
     allowed: &mut [bool],
@@ -274,7 +286,12 @@ fn fit_sizes(
             has_room(i, &station).then_some(station)
         };
         let n_sizes = if step_mm > 0.0 { N_SIZES } else { 1 };
-        match (0..n_sizes).find_map(fits).filter(|_| allowed[i]) {
+        let fit = if allowed[i] {
+            (0..n_sizes).find_map(fits)
+        } else {
+            None
+        };
+        match fit {
             Some(station) => stations[i] = station,
             None => allowed[i] = false,
         }
@@ -333,4 +350,40 @@ fn thin_out(params: &ConnectorParams, stations: &[RunStation]) -> Vec<RunStation
     }
     kept.push(stations[stations.len() - 1]);
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_narrows_gently_past_an_obstacle_and_breaks_off_where_no_size_has_room() {
+        let at = |i: i32| RunStation {
+            point: f64::from(i) * Vec3::X,
+            tangent: Vec3::X,
+            n: Vec3::Y,
+            s: Vec3::Z,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm: f64::from(i),
+            size_mm: 4.0,
+            clearance_mm: 0.12,
+            shape: RunShape::Seam,
+        };
+        let mut stations: Vec<RunStation> = (0..=30).map(at).collect();
+        let mut allowed = vec![true; 31];
+        // Sizes up to 2.5 mm pass the obstacle at 10, none the one at 25.
+        let has_room = |i: usize, station: &RunStation| match i {
+            10 => station.size_mm <= 2.5,
+            25 => false,
+            _ => true,
+        };
+        fit_sizes(&mut stations, &mut allowed, &has_room);
+        let broken: Vec<usize> = (0..=30).filter(|&i| !allowed[i]).collect();
+        assert_eq!(broken, [25]);
+        let size = |i: usize| stations[i].size_mm;
+        assert!(size(10) <= 2.5 && size(10) >= LEAST_SIZE_MM);
+        assert!((0..24).all(|i| (size(i + 1) - size(i)).abs() <= MOST_WIDENING + 1e-12));
+        assert_eq!((size(0), size(20), size(30)), (4.0, 4.0, 4.0));
+    }
 }
