@@ -47,3 +47,51 @@ impl<'a> Taken<'a> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::connector::{RunShape, RunStation};
+    use shellock_assembly::LatticeDirection;
+    use shellock_plan::LatticeStep;
+
+    /// Piece 2 leaves first, along y; piece 1 next, along z. A run along x joins pieces 2 and 0.
+    #[test]
+    fn connectors_keep_later_pieces_ways_free_and_their_own_way_clear_of_earlier_ones() {
+        let step = |piece: u32, along: Vec3| LatticeStep {
+            piece: PatchId(piece),
+            separation: LatticeDirection::nearest(along),
+        };
+        let plan = LatticePlan {
+            steps: vec![step(0, Vec3::X), step(1, Vec3::Z), step(2, Vec3::Y)],
+        };
+        let at = |x: f64| RunStation {
+            point: x * Vec3::X,
+            tangent: Vec3::X,
+            n: Vec3::Z,
+            s: Vec3::Y,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm: x,
+            size_mm: 2.5,
+            clearance_mm: 0.12,
+            shape: RunShape::Seam,
+        };
+        let mut taken = Taken::none(&plan);
+        taken.add(
+            &ConnectorParams::default(),
+            &Run {
+                male: PatchId(2),
+                female: PatchId(0),
+                stations: vec![at(0.0), at(10.0)],
+            },
+        );
+        let is_free = |piece: u32, y: f64, z: f64| taken.leaves_free(PatchId(piece), Vec3::new(5.1, y, z));
+        // Piece 2 carries its pin along y, over these points.
+        assert!(!is_free(0, 5.0, -0.5) && !is_free(1, 5.0, -0.5));
+        assert!(is_free(0, -9.0, -0.5) && is_free(0, 5.0, -9.0));
+        // Piece 1 would run into the channel of piece 0 from below it, and piece 2 from behind it.
+        assert!(!is_free(1, -2.0, -9.0) && is_free(1, -9.0, -9.0));
+        assert!(!is_free(2, -9.0, -2.0) && is_free(2, -9.0, 9.0));
+    }
+}
