@@ -20,13 +20,13 @@ pub(crate) enum Half {
 /// Corners in the plane of a section, counter-clockwise: coordinates along `n` and ŝ, mm.
 type Outline = Vec<[f64; 2]>;
 
-/// Bevel of the pin's tip and of the channel's outer edges, in connector sizes: the pin finds its channel,
-/// and no edge is sharper than an obtuse angle. Chosen by eye.
+/// Bevel of the pin's tip and of the channel's lower edges, in connector sizes, so that the pin finds its
+/// channel and hands find no sharp edge. Chosen by eye.
 const BEVEL_SIZES: f64 = 0.1;
 /// Distance that the stop of a rail keeps from the faces of the groove that it fills, mm.
 const INSIDE_MM: f64 = 0.01;
-/// Greatest overhang of an end that is left, mm, and width of the cut beyond the end's section, mm: a bent
-/// run overhangs its end aside of that section.
+/// Greatest overhang that an end keeps, mm, and margin of its cut around the end's section, mm: where a run
+/// is bent, it overhangs its end beside that section.
 const MOST_OVERHANG_MM: f64 = 0.1;
 const ASIDE_MM: f64 = 2.0;
 /// Greatest angle between the first and the last section of one solid, rad. A solid that turned farther
@@ -98,6 +98,7 @@ fn sweep(line: &[(&RunStation, &Outline)]) -> Vec<Volume> {
     solids
 }
 
+/// Solid through the outlines at successive stations; empty for fewer than two.
 fn solid(line: &[(&RunStation, &Outline)]) -> Volume {
     let ring =
         |(at, outline): &(&RunStation, &Outline)| outline.iter().map(|&[n, s]| at.place(n, s)).collect();
@@ -293,7 +294,7 @@ mod tests {
         }
     }
 
-    /// Around a circle, from a tongue to a pin and back, and closed.
+    /// The run turns farther than one solid may, and closes on itself.
     #[test]
     fn a_run_around_a_circle_is_one_solid_of_the_volume_that_its_section_sweeps() {
         let params = ConnectorParams::default();
