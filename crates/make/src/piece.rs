@@ -7,10 +7,12 @@
 
 mod carve;
 mod finish;
+mod halves;
 mod key_parts;
 mod label;
 mod relief;
 mod ribs;
+mod trim;
 
 pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
 pub use key_parts::Grip;

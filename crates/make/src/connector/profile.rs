@@ -56,6 +56,9 @@ pub struct Section {
 
 /// Angle between ŝ and the surface normal below which the pin is a tongue and needs a foot, rad: −40°.
 const TONGUE_ANGLE: f64 = -0.698;
+/// Least thickness of pins, channel walls and floors, tongues and lips, mm, at any size: two lines of a
+/// filament printer, twenty pixels of a resin printer.
+const LEAST_PART_MM: f64 = 1.0;
 /// Depth to which parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
 /// Depth to which the filling of a tongue's corner reaches into tongue and wall, mm.
@@ -107,7 +110,9 @@ impl Section {
     /// ```
     fn rail(params: &ConnectorParams, station: &RunStation, part: RailPart) -> Self {
         let (d, c) = (station.size_mm, station.clearance_mm);
-        let (reach, thick, wall) = (0.5 * d, 0.45 * d, (0.5 * d - c).max(params.min_wall_mm));
+        let reach = (0.5 * d).max(LEAST_PART_MM + c);
+        let thick = (0.45 * d).max(LEAST_PART_MM);
+        let wall = (0.5 * d - c).max(LEAST_PART_MM).max(params.min_wall_mm);
         let floor = -2.0 * c - 2.0 * thick;
         let lead = if part == RailPart::LeadIn {
             LEAD_IN_MM.min(0.3 * thick)
@@ -166,8 +171,10 @@ impl Section {
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ, which leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
-        let (pin_width, foot_width) = (PIN_WIDTH * d, FOOT_WIDTH * d);
-        let (wall, bottom) = (PIN_WIDTH * d - c, FLOOR * d);
+        let pin_width = (PIN_WIDTH * d).max(LEAST_PART_MM + c);
+        let foot_width = (FOOT_WIDTH * d).max(LEAST_PART_MM);
+        let wall = (PIN_WIDTH * d - c).max(LEAST_PART_MM);
+        let bottom = (FLOOR * d).max(LEAST_PART_MM);
         let lean = pin_width * backward.tan();
         let pin_depth = (PIN_DEPTH * d + lean) * k;
         let top_male = d.min(pin_width * forward.min(1.48).tan() + ROOT_MM) * k;
@@ -316,15 +323,20 @@ mod tests {
     }
 
     #[test]
-    fn no_wall_is_thinner_than_the_least() {
+    fn no_part_is_thinner_than_the_least_at_any_angle_and_size() {
         let params = ConnectorParams::default();
         for (degrees, size_mm) in angles_and_sizes() {
-            let section = Section::at(&params, &station(degrees, size_mm));
-            for part in section.male.iter().chain(&section.female).flatten() {
-                assert!(
-                    (part.n1 - part.n0).min(part.s1 - part.s0) >= params.min_wall_mm,
-                    "at {degrees}°: {part:?}"
-                );
+            let station = station(degrees, size_mm);
+            for section in [
+                Section::at(&params, &station),
+                Section::rail(&params, &station, RailPart::Full),
+            ] {
+                for part in section.male.iter().chain(&section.female).flatten() {
+                    assert!(
+                        (part.n1 - part.n0).min(part.s1 - part.s0) >= LEAST_PART_MM - 1e-12,
+                        "at {degrees}°, {size_mm} mm: {part:?}"
+                    );
+                }
             }
         }
     }

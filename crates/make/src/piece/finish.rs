@@ -5,25 +5,19 @@ use rayon::prelude::*;
 use shellock_assembly::PressFit;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
-use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
 use shellock_surface::Turn;
 
-use super::carve::{SweptVolume, subtract_sweeps};
+use super::halves::{Carved, Carver};
 use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
 use crate::body::{ShellBodies, ShellGrid};
-use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_half};
-
-/// Depth to which connectors reach into the wall they hang from, mm.
-const ROOT_MM: f64 = 0.4;
-/// Least share of either half that must survive the carving; below, both halves of the run are given up.
-const LEAST_KEPT: f64 = 0.25;
+use crate::connector::{ConnectorParams, Run};
 
 /// Distance of ribs from the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
@@ -35,11 +29,11 @@ pub struct FinishedJoint {
     pub male: PatchId,
     /// The piece with the channel.
     pub female: PatchId,
-    /// Length along the seam, mm; 0 where the run was given up.
+    /// Length along the seam, mm.
     pub length_mm: f64,
     /// Volume of the pin and of the channel below the wall, mm³, after carving.
     pub volume_mm3: [f64; 2],
-    /// Share of each half that survived the carving, in [0, 1].
+    /// Share of each half below the wall that carving left, in [0, 1].
     pub intact_share: [f64; 2],
     /// Middle of the run.
     pub at: Vec3,
@@ -51,7 +45,7 @@ pub struct FinishedJoint {
 pub struct Finished {
     /// One closed mesh a piece, turned, with coordinates that 32-bit floats hold.
     pub meshes: IdVec<PatchId, TriMesh>,
-    /// One joint a run.
+    /// One joint a run that is left.
     pub joints: Vec<FinishedJoint>,
     /// Features that press on purpose on the key's way in.
     pub press_fits: Vec<PressFit>,
@@ -89,13 +83,6 @@ pub struct FinishParams<'a> {
     pub turn: Turn,
 }
 
-/// Both halves of a run while they are being carved: volumes before carving, mm³, and carved shapes.
-#[derive(Clone)]
-struct Halves {
-    raw: [f64; 2],
-    shapes: [Volume; 2],
-}
-
 /// Carves every half connector in the disassembly sequence and joins it to its body. Cuts off what comes too
 /// near to other pieces. Gives a key its detents and its notch, and every piece its number.
 pub fn make(
@@ -113,16 +100,18 @@ pub fn make(
         .iter()
         .fold(Aabb::EMPTY, |b, r| b.union(*r))
         .diagonal();
-    let halves = carved_halves(ctx, params, grid, shell, plan, runs, far_mm)?;
-    let joints: Vec<FinishedJoint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
-    let kept: Vec<Run> = runs
-        .iter()
-        .zip(&joints)
-        .filter(|(_, j)| j.length_mm > 0.0)
-        .map(|(r, _)| r.clone())
-        .collect();
+    let carver = Carver {
+        ctx,
+        params,
+        grid,
+        shell,
+        plan,
+        far_mm,
+    };
+    let carved = carver.carve(runs)?;
+    let kept: Vec<Run> = carved.iter().map(|made| made.run.clone()).collect();
     ctx.stage("pieces", plan.steps.len())?;
-    let mut pieces = unite(shell, &joints, &halves);
+    let mut pieces = unite(shell, &carved);
     relieve(ctx, &finish.relief, plan, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
     changes.extend(
@@ -138,69 +127,9 @@ pub fn make(
     }
     Ok(Finished {
         meshes: make_printable(ctx, finish, grid, plan, &pieces, &changes)?,
-        joints,
+        joints: carved.iter().map(joint).collect(),
         press_fits,
     })
-}
-
-/// Carves both halves of each run in the disassembly sequence.
-fn carved_halves(
-    ctx: &Ctx,
-    params: &ConnectorParams,
-    grid: &ShellGrid,
-    shell: &ShellBodies,
-    plan: &LatticePlan,
-    runs: &[Run],
-    far_mm: f64,
-) -> Result<Vec<Halves>, Cancelled> {
-    ctx.stage("connectors", plan.steps.len())?;
-    let mut halves = vec![
-        Halves {
-            raw: [0.0; 2],
-            shapes: [Volume::empty(), Volume::empty()]
-        };
-        runs.len()
-    ];
-    let mut swept_volumes: Vec<SweptVolume> = Vec::new();
-    for step in plan.removal() {
-        let q = step.piece;
-        let mine: Vec<(usize, usize)> = (0..runs.len())
-            .flat_map(|r| {
-                let male = (runs[r].male == q).then_some((r, 0));
-                male.into_iter().chain((runs[r].female == q).then_some((r, 1)))
-            })
-            .collect();
-        let whole: Vec<Volume> = mine
-            .par_iter()
-            .map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h]))
-            .collect();
-        let clearance_mm = mine
-            .iter()
-            .map(|&(r, _)| runs[r].clearance_mm())
-            .fold(params.clearance_mm, f64::max);
-        let room = Room::of(clearance_mm, grid, shell, q);
-        let carve = |(&(r, h), whole): (&(usize, usize), &Volume)| {
-            let free = room.cut(whole);
-            if h == 1 {
-                return (whole.volume(), subtract_sweeps(&free, &swept_volumes, far_mm));
-            }
-            // A corner ends where its wall does. The field of obstructions is too coarse there, and the other
-            // wall's way, with the clearance of connectors around it, too wide.
-            let is_partner = |w: &&SweptVolume| w.piece == runs[r].female;
-            let pin = subtract_sweeps(&free, swept_volumes.iter().filter(is_partner), far_mm);
-            let half = pin.union(&room.corner(params, &runs[r]));
-            let strangers = swept_volumes.iter().filter(|w| !is_partner(w));
-            (whole.volume(), subtract_sweeps(&half, strangers, far_mm))
-        };
-        let made: Vec<(f64, Volume)> = mine.par_iter().zip(&whole).map(carve).collect();
-        for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
-            halves[r].raw[h] = raw;
-            halves[r].shapes[h] = volume;
-        }
-        swept_volumes.push(SweptVolume::of(params, runs, q, step.separation));
-        ctx.step()?;
-    }
-    Ok(halves)
 }
 
 /// The notch; warns where there is none.
@@ -216,158 +145,30 @@ fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Chang
     cut
 }
 
-/// Room for the half connectors of one piece.
-struct Room<'a> {
-    grid: &'a ShellGrid,
-    clearance_mm: f32,
-    /// Distance that the piece keeps from the cuts, mm, on all nodes.
-    gap_mm: &'a [f32],
-    /// Field that is positive where the piece may not be: in its way out or in a later piece's.
-    keep_out: Vec<f32>,
-    /// Field that is positive on the piece's own side of the cuts.
-    side: Vec<f32>,
-}
-
-impl<'a> Room<'a> {
-    fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &'a ShellBodies, q: PatchId) -> Self {
-        let cutoff = grid.cutoff_mm();
-        let (blocked, side) = rayon::join(
-            || shell.keep_out[q].spread(&grid.band, cutoff),
-            || shell.side[q].spread(&grid.band, -cutoff),
-        );
-        Self {
-            grid,
-            clearance_mm: clearance_mm as f32,
-            gap_mm: &shell.gap_mm,
-            keep_out: blocked,
-            side,
-        }
-    }
-
-    /// The region around `whole` where `field` is positive.
-    fn region(&self, whole: &Volume, field: &dyn Fn(usize) -> f32) -> Volume {
-        let (part, nodes) = self
-            .grid
-            .band
-            .part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
-        let field: Vec<f32> = nodes.iter().map(|&n| field(n as usize)).collect();
-        Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside)).expect("contours are manifold")
-    }
-
-    /// Least depth of connectors below the outer surface, mm.
-    fn ceiling(&self) -> f32 {
-        (self.grid.thickness_mm - ROOT_MM) as f32
-    }
-
-    /// Filling of the corners of a run's tongue where the tongue has room, as far off the cuts as the wall.
-    fn corner(&self, params: &ConnectorParams, run: &Run) -> Volume {
-        let has_tongue: Vec<bool> = run
-            .stations
-            .iter()
-            .map(|at| self.has_tongue(params, at))
-            .collect();
-        let stretches = (0..has_tongue.len()).collect::<Vec<_>>();
-        let stretches = stretches.chunk_by(|&i, &j| has_tongue[i] && has_tongue[j]);
-        let corner = |stretch: &[usize]| {
-            let stations = stretch.iter().map(|&i| run.stations[i]).collect();
-            whole_half(
-                params,
-                &Run {
-                    stations,
-                    ..run.clone()
-                },
-                Half::Corner,
-            )
-        };
-        let whole = Volume::union_all(stretches.filter(|s| s.len() > 1).map(corner).collect());
-        if whole.is_empty() {
-            return whole;
-        }
-        let (ceiling, depth) = (self.ceiling(), &self.grid.depth);
-        whole.intersect(&self.region(&whole, &|n| {
-            (self.side[n] - self.gap_mm[n]).min(depth[n] - ceiling)
-        }))
-    }
-
-    /// Returns true if a tongue has room in its middle, on both sides of the seam.
-    fn has_tongue(&self, params: &ConnectorParams, station: &RunStation) -> bool {
-        let section = Section::at(params, station);
-        let (Some(_), Some(tongue)) = (section.corner, section.male[0]) else {
-            return false;
-        };
-        let n = 0.5 * (tongue.n0 + tongue.n1);
-        let is_free = |s: f64| {
-            let blocked = self.grid.band.sample(&self.keep_out, station.place(n, s));
-            blocked.is_some_and(|by| by < -f64::from(self.clearance_mm))
-        };
-        [0.5, 0.25, -0.25]
-            .into_iter()
-            .all(|share| is_free(share * tongue.s0))
-    }
-
-    /// The part of `whole` that has room. It lies below the wall or a root's depth within it, and
-    /// `clearance_mm` away from obstructions. From the wall of other pieces it keeps the same distance: below
-    /// the wall by that much, or on the piece's own side of the cuts by the gap.
-    ///
-    /// A body's edge along the inner end of a seam is sharp. The single field of obstructions rounds it off
-    /// by up to a third of a cell, more than the clearance. Two smooth fields, united after contouring, keep
-    /// the edge. (Filling the angle in one field instead removes the connectors of narrow cavities.)
-    fn cut(&self, whole: &Volume) -> Volume {
-        let region = |field: &dyn Fn(usize) -> f32| self.region(whole, field);
-        let (ceiling, floor) = (self.ceiling(), self.grid.thickness_mm as f32 + self.clearance_mm);
-        let depth = &self.grid.depth;
-        let cell = self.grid.band.cell_mm() as f32;
-        // A piece's wall reaches to its gap, so its connectors must too: slots between the two would fuse.
-        let away = |n: usize| {
-            let below = ((depth[n] - floor) / cell).clamp(0.0, 1.0);
-            self.gap_mm[n] + (self.clearance_mm - self.gap_mm[n]).max(0.0) * below
-        };
-        let space = region(&|n| (depth[n] - ceiling).min(-self.keep_out[n] - away(n)));
-        let below = region(&|n| depth[n] - floor);
-        let beside = region(&|n| self.side[n] - self.gap_mm[n]);
-        let free = whole.intersect(&space);
-        free.intersect(&below.union(&beside))
-    }
-}
-
-fn joint(run: &Run, halves: &Halves) -> FinishedJoint {
-    let volume_mm3 = [halves.shapes[0].volume(), halves.shapes[1].volume()];
-    let kept = std::array::from_fn(|h| {
-        if halves.raw[h] > 0.0 {
-            volume_mm3[h] / halves.raw[h]
-        } else {
-            0.0
-        }
-    });
-    let holds = kept.iter().all(|k| *k >= LEAST_KEPT);
-    let length_mm = if holds { run.length() } else { 0.0 };
+fn joint(made: &Carved) -> FinishedJoint {
+    let run = &made.run;
     FinishedJoint {
         male: run.male,
         female: run.female,
-        length_mm,
-        volume_mm3,
-        intact_share: kept,
+        length_mm: run.length(),
+        volume_mm3: [made.halves[0].volume(), made.halves[1].volume()],
+        intact_share: made.intact_share(),
         at: run.middle(),
         is_rail: run.is_rail(),
     }
 }
 
-/// Unites the bodies with the half connectors that were kept.
-fn unite(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
+/// Unites the bodies with their half connectors.
+fn unite(shell: &ShellBodies, carved: &[Carved]) -> IdVec<PatchId, Volume> {
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
     let pieces: Vec<Volume> = ids
         .par_iter()
         .map(|&q| {
-            let mut parts = Vec::new();
-            for (joint, half) in joints.iter().zip(halves).filter(|(j, _)| j.length_mm > 0.0) {
-                if joint.male == q {
-                    parts.push(half.shapes[0].clone());
-                }
-                if joint.female == q {
-                    parts.push(half.shapes[1].clone());
-                }
-            }
-            shell.bodies[q].union(&Volume::union_all(parts))
+            let halves = carved
+                .iter()
+                .flat_map(|made| [made.run.male, made.run.female].into_iter().zip(&made.halves));
+            let own = halves.filter(|(piece, _)| *piece == q).map(|(_, half)| half.clone());
+            shell.bodies[q].union(&Volume::union_all(own.collect()))
         })
         .collect();
     pieces.into_iter().collect()

@@ -1,0 +1,296 @@
+//! Shortening of runs to the stretches on which carving leaves their whole section.
+
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{TriMesh, Vec3, Volume};
+use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
+
+use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section};
+
+/// Distance between the sections that are looked at, mm.
+const STEP_MM: f64 = 0.5;
+/// Points a side of each part of a section, and their distance from the part's sides, as a share of its
+/// width.
+const N_ACROSS: usize = 5;
+const FROM_SIDE: f64 = 0.1;
+/// Least share of each part of a section that is left where a run counts as whole, and where it counts at
+/// all. Points on a part's edge, which clearances round off, make up a tenth.
+const WHOLE: f64 = 0.9;
+const MOST: f64 = 0.5;
+/// Direction of the rays that tell inside from outside, along no edge of a connector.
+const RAY: Vec3 = Vec3::new(0.482, 0.659, 0.577);
+
+/// A section of a run: its place, in stations from the first, and the least share of any of its parts that
+/// carving left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Left {
+    pub at: f64,
+    pub share: f64,
+}
+
+/// A solid that can be asked for points.
+struct Body {
+    mesh: TriMesh,
+    tree: TriangleBvh,
+}
+
+impl Body {
+    fn of(volume: &Volume) -> Self {
+        let mesh = volume.to_mesh();
+        Self {
+            tree: TriangleBvh::new(&mesh),
+            mesh,
+        }
+    }
+
+    fn holds(&self, point: Vec3) -> bool {
+        let hit = self.tree.first_hit(point, RAY, f64::INFINITY);
+        hit.is_some_and(|(face, _)| self.mesh.face_normal(face as usize).dot(RAY) > 0.0)
+    }
+}
+
+/// Compares one half of a run, `whole` and `carved`, section by section. `parts` gives the half's parts of a
+/// section, and only points with `counts` are compared.
+pub(super) fn sections_left(
+    params: &ConnectorParams,
+    run: &Run,
+    parts: &dyn Fn(&Section) -> Vec<Option<ProfileRect>>,
+    [whole, carved]: [&Volume; 2],
+    counts: &dyn Fn(Vec3) -> bool,
+) -> Vec<Left> {
+    let [whole, carved] = [whole, carved].map(Body::of);
+    let share = |points: Vec<Vec3>| {
+        let points = points.into_iter().filter(|p| counts(*p) && whole.holds(*p));
+        let (n_left, n) = points.fold((0, 0), |(n_left, n), p| (n_left + u32::from(carved.holds(p)), n + 1));
+        if n > 0 { f64::from(n_left) / f64::from(n) } else { 1.0 }
+    };
+    let mut all = Vec::new();
+    for (i, pair) in run.stations.windows(2).enumerate() {
+        let [a, b] = [&pair[0], &pair[1]];
+        let sections = [a, b].map(|at| parts(&Section::at(params, at)));
+        let n_steps = (a.point.distance(b.point) / STEP_MM).ceil().max(1.0) as usize;
+        for step in 0..n_steps {
+            let t = (step as f64 + 0.5) / n_steps as f64;
+            let shares = sections[0].iter().zip(&sections[1]).filter_map(|(at_a, at_b)| {
+                let (at_a, at_b) = ((*at_a)?, (*at_b)?);
+                Some(share(points_between((a, at_a), (b, at_b), t)))
+            });
+            all.push(Left {
+                at: i as f64 + t,
+                share: shares.fold(1.0, f64::min),
+            });
+        }
+    }
+    all
+}
+
+/// Points of a part between two stations, at the share `t` of the way.
+fn points_between(
+    (a, at_a): (&RunStation, ProfileRect),
+    (b, at_b): (&RunStation, ProfileRect),
+    t: f64,
+) -> Vec<Vec3> {
+    let place = |at: &RunStation, part: ProfileRect, i: usize| {
+        let between = |from: f64, to: f64, i: usize| {
+            let share = FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
+            from + (to - from) * share
+        };
+        at.place(
+            between(part.n0, part.n1, i % N_ACROSS),
+            between(part.s0, part.s1, i / N_ACROSS),
+        )
+    };
+    (0..N_ACROSS * N_ACROSS)
+        .map(|i| place(a, at_a, i).lerp(place(b, at_b, i), t))
+        .collect()
+}
+
+/// The stretches of `run` on which both halves are `left` whole; `None` where that is all of it. Where there
+/// is none long enough, the stretches on which most is left; a run without any is given up.
+pub(super) fn trimmed(run: &Run, left: [&[Left]; 2]) -> Option<Vec<Run>> {
+    let shares: Vec<(f64, f64)> = left[0]
+        .iter()
+        .zip(left[1])
+        .map(|(male, female)| (male.at, male.share.min(female.share)))
+        .collect();
+    let all_have = |least: f64| shares.iter().all(|(_, share)| *share >= least);
+    if all_have(WHOLE) {
+        return None;
+    }
+    let whole = stretches(run, &shares, WHOLE);
+    if !whole.is_empty() {
+        return Some(whole);
+    }
+    (!all_have(MOST)).then(|| stretches(run, &shares, MOST))
+}
+
+/// The stretches on which at least `least` of each section is left, if that is not all of them.
+fn stretches(run: &Run, shares: &[(f64, f64)], least: f64) -> Vec<Run> {
+    let last = (run.stations.len() - 1) as f64;
+    let is_left = |share: &(f64, f64)| share.1 >= least;
+    // A closed run is opened where it is not left.
+    let opening = shares.iter().position(|share| !is_left(share)).filter(|_| run.is_loop());
+    let (after, before) = shares.split_at(opening.unwrap_or(0));
+    let wrapped = after.iter().map(|(at, share)| (at + last, *share));
+    let shares: Vec<(f64, f64)> = before.iter().copied().chain(wrapped).collect();
+    let mut runs = Vec::new();
+    let mut from = 0;
+    for stretch in shares.chunk_by(|a, b| is_left(a) == is_left(b)) {
+        let to = from + stretch.len();
+        if is_left(&stretch[0]) {
+            let is_end = |at: usize, end: usize| opening.is_none() && at == end;
+            let begin = if is_end(from, 0) { 0.0 } else { shares[from].0 };
+            let end = if is_end(to, shares.len()) { last } else { shares[to - 1].0 };
+            runs.extend(part_of(run, begin, end));
+        }
+        from = to;
+    }
+    runs
+}
+
+/// The part of a run between two places, beyond the last station of a closed one too; `None` where it is too
+/// short.
+fn part_of(run: &Run, begin: f64, end: f64) -> Option<Run> {
+    let inner = (begin.floor() as usize + 1)..(end.ceil() as usize);
+    let places = std::iter::once(begin).chain(inner.map(|i| i as f64)).chain([end]);
+    let part = Run {
+        stations: places.map(|at| station_at(run, at)).collect(),
+        ..run.clone()
+    };
+    let least_mm = part.stations.iter().map(|at| at.size_mm).fold(f64::INFINITY, f64::min);
+    (part.length() >= SHORTEST_RUN_SIZES * least_mm).then_some(part)
+}
+
+/// The station at a place of a run, between its neighbours.
+fn station_at(run: &Run, at: f64) -> RunStation {
+    let last = run.stations.len() - 1;
+    let (round, at) = ((at / last as f64 - 1e-9).floor().max(0.0), at);
+    let at = at - round * last as f64;
+    let i = (at.floor() as usize).min(last - 1);
+    let (a, b, t) = (&run.stations[i], &run.stations[i + 1], at - i as f64);
+    if t == 0.0 && round == 0.0 {
+        return *a;
+    }
+    let turn_mm = run.stations[last].arc_mm - run.stations[0].arc_mm;
+    let between = |from: f64, to: f64| from + (to - from) * t;
+    let tangent = a.tangent.lerp(b.tangent, t).normalize_or_zero();
+    let s = a.s.lerp(b.s, t).normalize_or_zero();
+    RunStation {
+        point: a.point.lerp(b.point, t),
+        tangent,
+        n: a.n.lerp(b.n, t).reject_from_normalized(s).normalize_or_zero(),
+        s,
+        theta: between(a.theta, b.theta),
+        depth: between(a.depth, b.depth),
+        arc_mm: between(a.arc_mm, b.arc_mm) + round * turn_mm,
+        size_mm: between(a.size_mm, b.size_mm),
+        ..*a
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_report::PatchId;
+
+    use super::*;
+    use crate::connector::RunShape;
+    use crate::piece::whole_halves;
+
+    fn station(point: Vec3, tangent: Vec3, arc_mm: f64) -> RunStation {
+        RunStation {
+            point,
+            tangent,
+            n: Vec3::Z.cross(tangent),
+            s: Vec3::Z,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm,
+            size_mm: 2.5,
+            clearance_mm: 0.12,
+            shape: RunShape::Seam,
+        }
+    }
+
+    fn run(stations: Vec<RunStation>) -> Run {
+        Run {
+            male: PatchId(0),
+            female: PatchId(1),
+            stations,
+        }
+    }
+
+    /// A run of 20 mm along x, with a station every 5 mm.
+    fn straight() -> Run {
+        run((0..5).map(|i| 5.0 * f64::from(i)).map(|x| station(x * Vec3::X, Vec3::X, x)).collect())
+    }
+
+    /// A run round a circle of 10 mm radius.
+    fn round() -> Run {
+        let at = |i: u32| {
+            let angle = f64::from(i % 24) * std::f64::consts::TAU / 24.0;
+            let out = Vec3::new(angle.cos(), angle.sin(), 0.0);
+            station(10.0 * out, Vec3::Z.cross(out), 10.0 * f64::from(i) * std::f64::consts::TAU / 24.0)
+        };
+        run((0..=24).map(at).collect())
+    }
+
+    fn left(run: &Run, share: impl Fn(f64) -> f64) -> Vec<Left> {
+        let n = 8 * (run.stations.len() - 1);
+        let at = (0..n).map(|i| (f64::from(i as u32) + 0.5) / 8.0);
+        at.map(|at| Left { at, share: share(at) }).collect()
+    }
+
+    #[test]
+    fn a_run_that_loses_its_middle_becomes_two_and_one_that_loses_nothing_stays() {
+        let run = straight();
+        let all = left(&run, |_| 0.96);
+        assert!(trimmed(&run, [&all, &all]).is_none());
+        let holed = left(&run, |at| if (1.6..2.0).contains(&at) { 0.3 } else { 1.0 });
+        let parts = trimmed(&run, [&all, &holed]).unwrap();
+        let ends: Vec<[f64; 2]> = parts
+            .iter()
+            .map(|part| [0, part.stations.len() - 1].map(|i| part.stations[i].point.x))
+            .collect();
+        assert_eq!(ends.len(), 2);
+        assert!(ends[0][0] == 0.0 && ends[0][1] < 8.0 && ends[1][0] >= 10.0 && ends[1][1] == 20.0);
+    }
+
+    #[test]
+    fn a_run_that_nowhere_stays_whole_keeps_where_most_is_left_and_one_without_goes() {
+        let run = straight();
+        let half = left(&run, |at| if at < 2.0 { 0.7 } else { 0.2 });
+        let parts = trimmed(&run, [&half, &half]).unwrap();
+        assert!(parts.len() == 1 && (parts[0].length() - 10.0).abs() < 1.0);
+        let most = left(&run, |_| 0.7);
+        assert!(trimmed(&run, [&most, &most]).is_none());
+        let gone = left(&run, |_| 0.1);
+        assert_eq!(trimmed(&run, [&gone, &gone]).unwrap().len(), 0);
+    }
+
+    #[test]
+    fn a_closed_run_opens_where_it_is_lost() {
+        let run = round();
+        let all = left(&run, |_| 1.0);
+        let open = left(&run, |at| if (5.0..7.0).contains(&at) { 0.0 } else { 1.0 });
+        let parts = trimmed(&run, [&open, &all]).unwrap();
+        assert!(parts.len() == 1 && !parts[0].is_loop());
+        let expected = run.length() * 22.0 / 24.0;
+        assert!((parts[0].length() - expected).abs() < 1.0, "{}", parts[0].length());
+        let arcs: Vec<f64> = parts[0].stations.iter().map(|at| at.arc_mm).collect();
+        assert!(arcs.windows(2).all(|w| w[1] > w[0]), "{arcs:?}");
+        let [pin, channel] = whole_halves(&ConnectorParams::default(), &parts[0]);
+        assert!(pin.volume() > 0.0 && channel.volume() > 0.0);
+    }
+
+    #[test]
+    fn sections_tell_what_is_left_of_each_part() {
+        let (run, params) = (straight(), ConnectorParams::default());
+        let [pin, _] = whole_halves(&params, &run);
+        let cut = shellock_testkit::shapes::cuboid([8.0, -9.0, -9.0], [20.5, 9.0, -0.75]);
+        let parts = |section: &Section| section.male.to_vec();
+        let found = sections_left(&params, &run, &parts, [&pin, &pin.subtract(&cut)], &|p| p.z < 0.0);
+        let x = |left: &Left| 5.0 * left.at;
+        assert!(found.iter().filter(|l| x(l) < 7.8).all(|l| l.share == 1.0));
+        // The pin is 1.5 mm deep, and half of that is gone.
+        assert!(found.iter().filter(|l| x(l) > 8.2).all(|l| (0.4..0.6).contains(&l.share)));
+    }
+}
