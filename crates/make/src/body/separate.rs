@@ -203,7 +203,7 @@ fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId
         return Ok(vec![(only.piece, wall)]);
     }
     with.ctx.check()?;
-    let (leaving, staying) = cuts.split_at(cuts.len() / 2);
+    let (leaving, staying) = cuts.split_at(1);
     let g = with.preference(leaving);
     let (theirs, rest) = rayon::join(|| with.side(&wall, &g, 1.0), || with.side(&wall, &g, -1.0));
     drop((wall, g));
