@@ -23,7 +23,6 @@ pub fn connector_sizes(design: &Design) -> String {
         .kit
         .joints
         .iter()
-        .filter(|j| j.length_mm > 0.0)
         .map(|j| [design.kit.sizes.of(j.male, j.female); 2]);
     let ends = made
         .reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])])

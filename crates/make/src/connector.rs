@@ -16,8 +16,8 @@
 //! A run of connectors is one profile swept along the seam. Its shape changes smoothly with the angle between
 //! the separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin
 //! can leave along the separation direction and along no other. A run is made where its whole section is
-//! clear of walls and of other connectors, and is smaller where there is less room. Only a seam that has no
-//! such place gets a run that carving reduces.
+//! clear of walls and of other connectors, and is smaller where there is less room. A seam that has no such
+//! place gets a run that carving reduces. Runs are then shortened to the stretches that carving leaves whole.
 //!
 //! No such profile holds where a key slides along its seam. There the key's neighbour carries a straight
 //! tongue under the key's wall, and the key has a groove around it (`connector::rail`).

@@ -151,7 +151,7 @@ fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], 
     for contact in contacts.iter().filter(has_room) {
         let pair = [contact.later, contact.earlier];
         let joins = |j: &&FinishedJoint| pair.contains(&j.male) && pair.contains(&j.female);
-        if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
+        if !joints.iter().any(|j| joins(&j)) {
             ctx.warn(Warning::new(
                 Cause::SeamWithoutConnector {
                     length_mm: contact.length_mm,

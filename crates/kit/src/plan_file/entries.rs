@@ -179,11 +179,11 @@ pub struct JointEntry {
     pub male: PatchId,
     /// Piece with the channel.
     pub female: PatchId,
-    /// Length along the seam, mm; 0 if the run was given up.
+    /// Length along the seam, mm.
     pub length_mm: f64,
     /// Volumes of the pin and of the channel below the wall, mm³.
     pub volume_mm3: [f64; 2],
-    /// Share of each half that survived the carving, in [0, 1].
+    /// Share of each half below the wall that carving left, in [0, 1].
     pub kept: [f64; 2],
     /// Middle of the run, mm.
     pub at: [f64; 3],

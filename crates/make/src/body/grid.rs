@@ -316,13 +316,6 @@ impl LocalField {
         Self { nodes, values }
     }
 
-    /// Raises `field` to this field's values where those are greater.
-    pub(super) fn raise(&self, field: &mut [f32]) {
-        for (&n, &v) in self.nodes.iter().zip(&self.values) {
-            field[n as usize] = field[n as usize].max(v);
-        }
-    }
-
     /// Spreads this field over all nodes of the band, with the value `elsewhere` at the others.
     pub fn spread(&self, band: &Band, elsewhere: f32) -> Vec<f32> {
         let mut field = vec![elsewhere; band.len()];

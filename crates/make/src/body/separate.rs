@@ -194,38 +194,27 @@ struct Splitter<'a> {
     gap_mm: &'a [f32],
 }
 
-/// Divides `wall` among the pieces of `cuts`, given in the disassembly sequence: first between the earlier
-/// and the later half of them, then each half recursively. Every triangle thus takes part in log n booleans,
-/// not in n.
+/// Cuts the pieces of `cuts` off `wall`, in the disassembly sequence. A cut is the last to touch its piece, so
+/// no cut runs along the face of a former one, where rounding would fold the surface.
 fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
-    if let [only] = cuts {
-        with.ctx.step()?;
-        return Ok(vec![(only.piece, wall)]);
-    }
     with.ctx.check()?;
-    let (leaving, staying) = cuts.split_at(1);
-    let g = with.preference(leaving);
-    let (theirs, rest) = rayon::join(|| with.side(&wall, &g, 1.0), || with.side(&wall, &g, -1.0));
-    drop((wall, g));
-    let (a, b) = rayon::join(|| split(with, theirs, leaving), || split(with, rest, staying));
-    let mut parts = a?;
-    parts.extend(b?);
+    let (first, later) = cuts.split_first().expect("there is a cut for each piece");
+    let Some(field) = &first.field else {
+        with.ctx.step()?;
+        return Ok(vec![(first.piece, wall)]);
+    };
+    let g = field.spread(&with.grid.band, -with.grid.cutoff_mm());
+    let body = || {
+        let body = with.side(&wall, &g, 1.0);
+        with.ctx.step().map(|()| body)
+    };
+    let (body, parts) = rayon::join(body, || split(with, with.side(&wall, &g, -1.0), later));
+    let mut parts = parts?;
+    parts.push((first.piece, body?));
     Ok(parts)
 }
 
 impl Splitter<'_> {
-    /// Field that is positive on the side of any of the `leaving` pieces.
-    fn preference(&self, leaving: &[Cut]) -> Vec<f32> {
-        let mut g = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
-        for cut in leaving {
-            cut.field
-                .as_ref()
-                .expect("only the last piece has no cut")
-                .raise(&mut g);
-        }
-        g
-    }
-
     /// The part of `wall` where `sign · g` is positive, less the gap.
     ///
     /// A collar along the cut, on its other side, is subtracted from the wall. The wall then falls apart, and

@@ -167,7 +167,9 @@ fn unite(shell: &ShellBodies, carved: &[Carved]) -> IdVec<PatchId, Volume> {
             let halves = carved
                 .iter()
                 .flat_map(|made| [made.run.male, made.run.female].into_iter().zip(&made.halves));
-            let own = halves.filter(|(piece, _)| *piece == q).map(|(_, half)| half.clone());
+            let own = halves
+                .filter(|(piece, _)| *piece == q)
+                .map(|(_, half)| half.clone());
             shell.bodies[q].union(&Volume::union_all(own.collect()))
         })
         .collect();

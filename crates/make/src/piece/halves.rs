@@ -60,7 +60,8 @@ impl Carver<'_> {
     /// Carves both halves of each run. Runs that lose a part of their section are shortened to the stretches
     /// that lose nothing, and given up where no stretch is long enough.
     pub fn carve(&self, runs: &[Run]) -> Result<Vec<Carved>, Cancelled> {
-        let mut made = self.carved(runs, &vec![true; runs.len()])?;
+        self.ctx.stage("connectors", self.plan.steps.len())?;
+        let mut made = self.carved(runs, &vec![true; runs.len()], true)?;
         for _ in 0..MOST_TRIMS {
             let mut next: Vec<(Run, Option<Carved>)> = Vec::new();
             for carved in made.drain(..) {
@@ -72,19 +73,16 @@ impl Carver<'_> {
             // Shorter runs are in fewer ways, so what was whole stays so.
             let is_new: Vec<bool> = next.iter().map(|(_, carved)| carved.is_none()).collect();
             let runs: Vec<Run> = next.iter().map(|(run, _)| run.clone()).collect();
-            let mut anew = self.carved(&runs, &is_new)?.into_iter();
+            let mut anew = self.carved(&runs, &is_new, false)?.into_iter();
             let carved = next.into_iter().map(|(_, old)| old.or_else(|| anew.next()));
             made = carved.map(|made| made.expect("each new run is carved")).collect();
-            if !is_new.contains(&true) {
-                break;
-            }
         }
         Ok(made)
     }
 
-    /// Carves both halves of the runs with `is_wanted`, in the disassembly sequence.
-    fn carved(&self, runs: &[Run], is_wanted: &[bool]) -> Result<Vec<Carved>, Cancelled> {
-        self.ctx.stage("connectors", self.plan.steps.len())?;
+    /// Carves both halves of the runs with `is_wanted`, in the disassembly sequence. Each piece is a step of
+    /// the stage if this `counts`.
+    fn carved(&self, runs: &[Run], is_wanted: &[bool], counts: bool) -> Result<Vec<Carved>, Cancelled> {
         let empty = |run: &Run| Carved {
             run: run.clone(),
             halves: [Volume::empty(), Volume::empty()],
@@ -105,9 +103,16 @@ impl Carver<'_> {
                 made[r].left[h] = left;
             }
             swept_volumes.push(SweptVolume::of(self.params, runs, q, step.separation));
-            self.ctx.step()?;
+            if counts {
+                self.ctx.step()?;
+            } else {
+                self.ctx.check()?;
+            }
         }
-        let wanted = made.into_iter().zip(is_wanted).filter(|(_, is_wanted)| **is_wanted);
+        let wanted = made
+            .into_iter()
+            .zip(is_wanted)
+            .filter(|(_, is_wanted)| **is_wanted);
         Ok(wanted.map(|(made, _)| made).collect())
     }
 

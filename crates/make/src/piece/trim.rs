@@ -60,8 +60,14 @@ pub(super) fn sections_left(
     let [whole, carved] = [whole, carved].map(Body::of);
     let share = |points: Vec<Vec3>| {
         let points = points.into_iter().filter(|p| counts(*p) && whole.holds(*p));
-        let (n_left, n) = points.fold((0, 0), |(n_left, n), p| (n_left + u32::from(carved.holds(p)), n + 1));
-        if n > 0 { f64::from(n_left) / f64::from(n) } else { 1.0 }
+        let (n_left, n) = points.fold((0, 0), |(n_left, n), p| {
+            (n_left + u32::from(carved.holds(p)), n + 1)
+        });
+        if n > 0 {
+            f64::from(n_left) / f64::from(n)
+        } else {
+            1.0
+        }
     };
     let mut all = Vec::new();
     for (i, pair) in run.stations.windows(2).enumerate() {
@@ -128,7 +134,10 @@ fn stretches(run: &Run, shares: &[(f64, f64)], least: f64) -> Vec<Run> {
     let last = (run.stations.len() - 1) as f64;
     let is_left = |share: &(f64, f64)| share.1 >= least;
     // A closed run is opened where it is not left.
-    let opening = shares.iter().position(|share| !is_left(share)).filter(|_| run.is_loop());
+    let opening = shares
+        .iter()
+        .position(|share| !is_left(share))
+        .filter(|_| run.is_loop());
     let (after, before) = shares.split_at(opening.unwrap_or(0));
     let wrapped = after.iter().map(|(at, share)| (at + last, *share));
     let shares: Vec<(f64, f64)> = before.iter().copied().chain(wrapped).collect();
@@ -139,7 +148,11 @@ fn stretches(run: &Run, shares: &[(f64, f64)], least: f64) -> Vec<Run> {
         if is_left(&stretch[0]) {
             let is_end = |at: usize, end: usize| opening.is_none() && at == end;
             let begin = if is_end(from, 0) { 0.0 } else { shares[from].0 };
-            let end = if is_end(to, shares.len()) { last } else { shares[to - 1].0 };
+            let end = if is_end(to, shares.len()) {
+                last
+            } else {
+                shares[to - 1].0
+            };
             runs.extend(part_of(run, begin, end));
         }
         from = to;
@@ -156,7 +169,11 @@ fn part_of(run: &Run, begin: f64, end: f64) -> Option<Run> {
         stations: places.map(|at| station_at(run, at)).collect(),
         ..run.clone()
     };
-    let least_mm = part.stations.iter().map(|at| at.size_mm).fold(f64::INFINITY, f64::min);
+    let least_mm = part
+        .stations
+        .iter()
+        .map(|at| at.size_mm)
+        .fold(f64::INFINITY, f64::min);
     (part.length() >= SHORTEST_RUN_SIZES * least_mm).then_some(part)
 }
 
@@ -220,7 +237,10 @@ mod tests {
 
     /// A run of 20 mm along x, with a station every 5 mm.
     fn straight() -> Run {
-        run((0..5).map(|i| 5.0 * f64::from(i)).map(|x| station(x * Vec3::X, Vec3::X, x)).collect())
+        run((0..5)
+            .map(|i| 5.0 * f64::from(i))
+            .map(|x| station(x * Vec3::X, Vec3::X, x))
+            .collect())
     }
 
     /// A run round a circle of 10 mm radius.
@@ -228,7 +248,11 @@ mod tests {
         let at = |i: u32| {
             let angle = f64::from(i % 24) * std::f64::consts::TAU / 24.0;
             let out = Vec3::new(angle.cos(), angle.sin(), 0.0);
-            station(10.0 * out, Vec3::Z.cross(out), 10.0 * f64::from(i) * std::f64::consts::TAU / 24.0)
+            station(
+                10.0 * out,
+                Vec3::Z.cross(out),
+                10.0 * f64::from(i) * std::f64::consts::TAU / 24.0,
+            )
         };
         run((0..=24).map(at).collect())
     }
@@ -274,7 +298,11 @@ mod tests {
         let parts = trimmed(&run, [&open, &all]).unwrap();
         assert!(parts.len() == 1 && !parts[0].is_loop());
         let expected = run.length() * 22.0 / 24.0;
-        assert!((parts[0].length() - expected).abs() < 1.0, "{}", parts[0].length());
+        assert!(
+            (parts[0].length() - expected).abs() < 1.0,
+            "{}",
+            parts[0].length()
+        );
         let arcs: Vec<f64> = parts[0].stations.iter().map(|at| at.arc_mm).collect();
         assert!(arcs.windows(2).all(|w| w[1] > w[0]), "{arcs:?}");
         let [pin, channel] = whole_halves(&ConnectorParams::default(), &parts[0]);
@@ -291,6 +319,11 @@ mod tests {
         let x = |left: &Left| 5.0 * left.at;
         assert!(found.iter().filter(|l| x(l) < 7.8).all(|l| l.share == 1.0));
         // The pin is 1.5 mm deep, and half of that is gone.
-        assert!(found.iter().filter(|l| x(l) > 8.2).all(|l| (0.4..0.6).contains(&l.share)));
+        assert!(
+            found
+                .iter()
+                .filter(|l| x(l) > 8.2)
+                .all(|l| (0.4..0.6).contains(&l.share))
+        );
     }
 }
