@@ -42,7 +42,7 @@ impl Carved {
     }
 }
 
-/// Inputs of carving.
+/// Inputs that the halves of all runs share.
 pub(super) struct Carver<'a> {
     pub ctx: &'a Ctx<'a>,
     pub params: &'a ConnectorParams,
