@@ -177,17 +177,21 @@ fn part_of(run: &Run, begin: f64, end: f64) -> Option<Run> {
     (part.length() >= SHORTEST_RUN_SIZES * least_mm).then_some(part)
 }
 
-/// The station at a place of a run, between its neighbours.
+/// The station at a place of a run, between its neighbours. Places beyond the last station of a closed run go
+/// round it once more.
 fn station_at(run: &Run, at: f64) -> RunStation {
     let last = run.stations.len() - 1;
-    let (round, at) = ((at / last as f64 - 1e-9).floor().max(0.0), at);
-    let at = at - round * last as f64;
+    let (at, turns) = if at > last as f64 {
+        (at - last as f64, 1.0)
+    } else {
+        (at, 0.0)
+    };
+    let turn_mm = run.stations[last].arc_mm - run.stations[0].arc_mm;
     let i = (at.floor() as usize).min(last - 1);
     let (a, b, t) = (&run.stations[i], &run.stations[i + 1], at - i as f64);
-    if t == 0.0 && round == 0.0 {
+    if t == 0.0 && turns == 0.0 {
         return *a;
     }
-    let turn_mm = run.stations[last].arc_mm - run.stations[0].arc_mm;
     let between = |from: f64, to: f64| from + (to - from) * t;
     let tangent = a.tangent.lerp(b.tangent, t).normalize_or_zero();
     let s = a.s.lerp(b.s, t).normalize_or_zero();
@@ -198,7 +202,7 @@ fn station_at(run: &Run, at: f64) -> RunStation {
         s,
         theta: between(a.theta, b.theta),
         depth: between(a.depth, b.depth),
-        arc_mm: between(a.arc_mm, b.arc_mm) + round * turn_mm,
+        arc_mm: between(a.arc_mm, b.arc_mm) + turns * turn_mm,
         size_mm: between(a.size_mm, b.size_mm),
         ..*a
     }
