@@ -65,8 +65,8 @@ pub struct ConnectorParams {
     /// Interference of the ribs of a key without rails with the pieces around it: only friction holds such a
     /// key. [0, 0.3]; 0.08.
     pub key_rib_mm: f64,
-    /// Least thickness of the walls of rails; thinner places of pieces are reported. [0.1, 2]; 0.4, one
-    /// extrusion line or eight pixels of a resin printer.
+    /// Thickness below which places of pieces are reported, and that walls of rails have at least. [0.1, 2];
+    /// 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
 

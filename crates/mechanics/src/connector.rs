@@ -1,5 +1,5 @@
 //! Proportions of a connector, as multiples of its size D. Planning, simulation and manufacture share this
-//! one shape.
+//! one shape. Parts of connectors smaller than 2.3 mm are made thicker than this, 1 mm at least.
 //!
 //! ```text
 //!       female │ male         ↑ ŝ

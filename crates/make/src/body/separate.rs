@@ -194,8 +194,10 @@ struct Splitter<'a> {
     gap_mm: &'a [f32],
 }
 
-/// Cuts the pieces of `cuts` off `wall`, in the disassembly sequence. Nothing touches a piece after its own
-/// cut, so no cut runs along the face of a former one, where rounding would fold the surface.
+/// Cuts the pieces of `cuts` off `wall`, in the disassembly sequence.
+///
+/// The field of a cut ignores the pieces that left before. So its cut crosses the faces that former cuts left
+/// and does not run along them, where rounding would fold the surface.
 fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
     with.ctx.check()?;
     let (first, later) = cuts.split_first().expect("there is a cut for each piece");

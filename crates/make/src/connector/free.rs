@@ -9,9 +9,8 @@ use super::profile::{ProfileRect, Section};
 use super::station::RunStation;
 use crate::body::{ShellBodies, ShellGrid};
 
-/// Points a side of each part of a section that must be free, and their distance from the part's sides, as a
-/// share of its width: sampled fields round off the edges of walls.
-const N_ACROSS: usize = 5;
+/// Distance of the points that must be free from a part's sides, as a share of its width: sampled fields
+/// round off the edges of walls.
 const FROM_SIDE: f64 = 0.16;
 
 /// Returns a test of a piece and a point: `None` in or above the wall, else true if connectors of the piece
@@ -56,19 +55,10 @@ pub(super) fn has_room(
 ) -> bool {
     let section = Section::at(params, station);
     let halves: [(PatchId, &[Option<ProfileRect>]); 2] = [(male, &section.male), (female, &section.female)];
-    let between = |from: f64, to: f64, i: usize| {
-        let at = FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
-        from + (to - from) * at
-    };
     halves.iter().all(|(piece, parts)| {
-        let places = parts.iter().flatten().flat_map(|part| {
-            (0..N_ACROSS * N_ACROSS).map(|i| {
-                let n = between(part.n0, part.n1, i % N_ACROSS);
-                station.place(n, between(part.s0, part.s1, i / N_ACROSS))
-            })
-        });
+        let places = parts.iter().flatten().flat_map(|part| part.points(FROM_SIDE));
         let (n_free, n) = places
-            .filter_map(|at| is_free(*piece, at))
+            .filter_map(|[n, s]| is_free(*piece, station.place(n, s)))
             .fold((0, 0), |(n_free, n), is_free| {
                 (n_free + u32::from(is_free), n + 1)
             });

@@ -30,6 +30,17 @@ impl ProfileRect {
         }
     }
 
+    /// Five by five points inside, along `n` and ŝ, mm. The outer ones keep the share `from_side` of the width
+    /// from the sides.
+    pub fn points(self, from_side: f64) -> impl Iterator<Item = [f64; 2]> {
+        const N: usize = 5;
+        let between = move |from: f64, to: f64, i: usize| {
+            let at = from_side + (1.0 - 2.0 * from_side) * i as f64 / (N - 1) as f64;
+            from + (to - from) * at
+        };
+        (0..N * N).map(move |i| [between(self.n0, self.n1, i % N), between(self.s0, self.s1, i / N)])
+    }
+
     /// Corners of the rectangle in space, at a station.
     pub fn corners(self, at: &RunStation) -> [Vec3; 4] {
         [

@@ -8,9 +8,7 @@ use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section};
 
 /// Distance between the sections that are looked at, mm.
 const STEP_MM: f64 = 0.5;
-/// Points a side of each part of a section, and their distance from the part's sides, as a share of its
-/// width.
-const N_ACROSS: usize = 5;
+/// Distance of the points that are compared from a part's sides, as a share of its width.
 const FROM_SIDE: f64 = 0.1;
 /// Least share of each part of a section that is left where a run counts as whole, and where it counts at
 /// all. Points on a part's edge, which clearances round off, make up a tenth.
@@ -95,18 +93,10 @@ fn points_between(
     (b, at_b): (&RunStation, ProfileRect),
     t: f64,
 ) -> Vec<Vec3> {
-    let place = |at: &RunStation, part: ProfileRect, i: usize| {
-        let between = |from: f64, to: f64, i: usize| {
-            let share = FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N_ACROSS - 1) as f64;
-            from + (to - from) * share
-        };
-        at.place(
-            between(part.n0, part.n1, i % N_ACROSS),
-            between(part.s0, part.s1, i / N_ACROSS),
-        )
-    };
-    (0..N_ACROSS * N_ACROSS)
-        .map(|i| place(a, at_a, i).lerp(place(b, at_b, i), t))
+    let pairs = at_a.points(FROM_SIDE).zip(at_b.points(FROM_SIDE));
+    let place = |at: &RunStation, [n, s]: [f64; 2]| at.place(n, s);
+    pairs
+        .map(|(in_a, in_b)| place(a, in_a).lerp(place(b, in_b), t))
         .collect()
 }
 
@@ -129,7 +119,7 @@ pub(super) fn trimmed(run: &Run, left: [&[Left]; 2]) -> Option<Vec<Run>> {
     (!all_have(MOST)).then(|| stretches(run, &shares, MOST))
 }
 
-/// The stretches on which at least `least` of each section is left, if that is not all of them.
+/// The stretches of `run` on which at least `least` of each section is left.
 fn stretches(run: &Run, shares: &[(f64, f64)], least: f64) -> Vec<Run> {
     let last = (run.stations.len() - 1) as f64;
     let is_left = |share: &(f64, f64)| share.1 >= least;
