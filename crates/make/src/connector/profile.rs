@@ -30,8 +30,8 @@ impl ProfileRect {
         }
     }
 
-    /// Five by five points inside, along `n` and ŝ, mm. The outer ones keep the share `from_side` of the width
-    /// from the sides.
+    /// Five by five points inside, along `n` and ŝ, mm. The outer ones keep the share `from_side` of the
+    /// width from the sides.
     pub fn points(self, from_side: f64) -> impl Iterator<Item = [f64; 2]> {
         const N: usize = 5;
         let between = move |from: f64, to: f64, i: usize| {
