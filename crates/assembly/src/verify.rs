@@ -15,6 +15,7 @@ pub mod sample;
 mod body;
 mod columns;
 mod cover;
+mod folds;
 #[cfg(test)]
 pub(crate) mod kits;
 mod overlap;
@@ -141,6 +142,15 @@ pub enum Finding {
         /// Midpoint of the first edge.
         at: [f64; 3],
     },
+    /// The surface of a piece folds back on itself, so that faces have material right in front of them.
+    Folded {
+        /// Piece with these faces.
+        piece: PatchId,
+        /// Number of such faces.
+        count: usize,
+        /// Middle of the first face.
+        at: [f64; 3],
+    },
     /// The piece is not one connected body.
     SeveralBodies {
         /// Piece that falls apart.
@@ -223,6 +233,7 @@ impl Finding {
     pub fn place(&self) -> Option<[f64; 3]> {
         match self {
             Self::SharedEdges { at, .. }
+            | Self::Folded { at, .. }
             | Self::Overlap { at, .. }
             | Self::PathRubs { at, .. }
             | Self::PlayTooWide { at, .. }

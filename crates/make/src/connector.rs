@@ -22,6 +22,7 @@
 //! No such profile holds where a key slides along its seam. There the key's neighbour carries a straight
 //! tongue under the key's wall, and the key has a groove around it (`connector::rail`).
 
+mod contacts;
 mod frame;
 mod free;
 mod outline;
@@ -31,6 +32,7 @@ mod run;
 mod station;
 mod taken;
 
+pub(crate) use contacts::contacts;
 pub use frame::{Curve, curves};
 pub use free::is_unobstructed;
 pub(crate) use outline::{Half, whole_half};

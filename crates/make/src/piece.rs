@@ -14,7 +14,7 @@ mod relief;
 mod ribs;
 mod trim;
 
-pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
+pub use finish::{Connectors, FinishParams, Finished, FinishedJoint, PieceError, make};
 pub use key_parts::Grip;
 pub use label::LabelParams;
 pub use relief::Relief;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use shellock_assembly::motion::Contact;
 use shellock_assembly::{LatticeDirection, PressFitKind};
 use shellock_geom::Aabb;
 use shellock_plan::lesson::{Lesson, WeakJoint};
@@ -14,7 +15,7 @@ use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
 use crate::body::{self, BodyError, BodyParams, PatchDistances, ShellBodies, ShellGrid};
 use crate::causes::Cause;
 use crate::connector::{self, Run, SeamRoom, is_unobstructed};
-use crate::piece::{self, FinishParams, Finished, FinishedJoint, PieceError};
+use crate::piece::{self, Connectors, FinishParams, Finished, FinishedJoint, PieceError};
 
 /// Inputs of the pieces of a plan.
 pub struct Recipe<'a> {
@@ -68,12 +69,20 @@ impl From<PieceError> for MakeError {
     }
 }
 
-/// Makes the pieces of a plan: the wall, split along it; connectors under the seams; finished meshes. Also
-/// returns the room for connectors on each seam.
+/// Walls and connectors of a plan, before they are joined to pieces.
+pub struct Parts {
+    shell: ShellBodies,
+    connectors: Connectors,
+    /// Room for connectors on each seam.
+    rooms: Vec<SeamRoom>,
+    /// Places where the halves of connectors touch each other, each a clearance apart.
+    pub contacts: Vec<Contact>,
+}
+
+/// Makes the parts of a plan: the wall, split along it, and connectors under the seams.
 ///
-/// Warns of parts that a piece lost, of a key without ribs, a notch or a number, of places that press on
-/// purpose, and of seams without a connector.
-pub fn make(ctx: &Ctx, recipe: &Recipe<'_>) -> Result<(Finished, Vec<SeamRoom>), MakeError> {
+/// Warns of parts that a piece lost.
+pub fn make_parts(ctx: &Ctx, recipe: &Recipe<'_>) -> Result<Parts, MakeError> {
     let Recipe {
         body,
         finish,
@@ -84,13 +93,39 @@ pub fn make(ctx: &Ctx, recipe: &Recipe<'_>) -> Result<(Finished, Vec<SeamRoom>),
         plan,
         ..
     } = recipe;
-    let rooms = rooms(body, finish, surface, sizes);
-    let shell = body::build(ctx, body, grid, distances, plan, &rooms)?;
-    let (runs, contacts) = connectors(recipe, &shell);
-    let finished = piece::make(ctx, finish, grid, &shell, plan, &runs, &rooms)?;
+    let boxes = boxes(body, finish, surface, sizes);
+    let shell = body::build(ctx, body, grid, distances, plan, &boxes)?;
+    let (runs, rooms) = connectors(recipe, &shell);
+    let connectors = Connectors::carve(ctx, finish.connector, grid, &shell, plan, &runs, &boxes)?;
+    let contacts = connectors.contacts(finish.connector);
+    Ok(Parts {
+        shell,
+        connectors,
+        rooms,
+        contacts,
+    })
+}
+
+/// Joins the parts of a plan to finished meshes. Also returns the room for connectors on each seam.
+///
+/// Warns of a key without ribs, a notch or a number, of places that press on purpose, and of seams without a
+/// connector.
+pub fn join_parts(
+    ctx: &Ctx,
+    recipe: &Recipe<'_>,
+    parts: Parts,
+) -> Result<(Finished, Vec<SeamRoom>), MakeError> {
+    let Recipe {
+        finish,
+        sizes,
+        grid,
+        plan,
+        ..
+    } = recipe;
+    let finished = piece::make(ctx, finish, grid, &parts.shell, plan, &parts.connectors)?;
     warn_of_press_fits(ctx, &finished);
-    warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
-    Ok((finished, contacts))
+    warn_of_bare_seams(ctx, sizes, &parts.rooms, &finished.joints);
+    Ok((finished, parts.rooms))
 }
 
 /// Places connectors along the seams. Returns their runs, and the room that each seam has for them.
@@ -164,7 +199,7 @@ fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], 
 }
 
 /// Returns a box around each patch and all connectors that its piece can have.
-fn rooms(
+fn boxes(
     body: &BodyParams,
     finish: &FinishParams<'_>,
     surface: &SegmentedSurface,
@@ -172,12 +207,12 @@ fn rooms(
 ) -> IdVec<PatchId, Aabb> {
     /// Upper bound of the shift of seams by carving, mm.
     const SHIFT_MM: f64 = 2.0;
-    let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
+    let mut boxes: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
     for (face, &p) in surface.patch_of_face.iter().enumerate() {
-        rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
+        boxes[p] = boxes[p].union(Aabb::around(surface.mesh.corners(face)));
     }
     let reach = body.thickness_mm + finish.connector.room_mm(sizes.largest_mm()) + SHIFT_MM;
-    rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
+    boxes.as_slice().iter().map(|b| b.grown(reach)).collect()
 }
 
 /// Finds pairs of pieces whose connectors came out too short to hold them together. Later plans must not rely

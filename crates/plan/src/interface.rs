@@ -19,9 +19,12 @@
 mod blocking;
 mod obstruction;
 mod sample;
+mod touches;
 
 pub use blocking::{BlockingTable, Pushes};
-use obstruction::Obstructions;
+pub use obstruction::{Leave, Obstructions, Sights};
+pub use touches::{pin_contacts, wall_contacts};
+
 use rayon::prelude::*;
 use sample::{Line, Way, lines};
 use shellock_assembly::LatticeDirection;
@@ -66,6 +69,8 @@ pub struct Interface {
     /// Joints by order (`a` later, then `b` later) and by direction.
     joints: [[Joint; LatticeDirection::COUNT]; 2],
     hold: BlockingTable,
+    /// Inner edges of the walls below the seams.
+    lines: Vec<Line>,
 }
 
 /// The frame of a seam as seen from its later piece: three perpendicular unit vectors.
@@ -91,6 +96,14 @@ impl SeamFrame {
     /// Returns true if the seam runs along `s`, so that the key can slide on a rail under it.
     pub fn carries_rail(&self, s: Vec3) -> bool {
         s.dot(self.tangent).abs() > MAX_ALONG_SEAM && s.dot(self.normal).abs() < MAX_OUT_OF_RAIL
+    }
+
+    /// Direction that the later piece's wall faces if the piece leaves along the unit vector `s`: towards the
+    /// earlier piece. If `s` leads there, the face leans, so that it does not obstruct the way out.
+    pub fn wall(&self, s: Vec3) -> Vec3 {
+        let in_section = s.reject_from_normalized(self.tangent).normalize_or_zero();
+        let lean = in_section.dot(self.across).max(0.0);
+        (self.across - lean * in_section).normalize_or(self.across)
     }
 
     /// Weight `w` of Eq. 4, in [β, 1 + β]: large if `s` runs along the seam or towards the earlier piece.
@@ -121,11 +134,8 @@ pub fn meeting(
         normal: station.normal,
         across,
     };
-    // If s leads towards the earlier piece, the face between the walls leans, so that it does not obstruct
-    // the way out.
     let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
-    let lean = in_section.dot(across).max(0.0);
-    let face = (across - lean * in_section).normalize_or(across);
+    let face = frame.wall(s);
     let wall = if a_is_later { face } else { -face };
     let (later, earlier) = if a_is_later {
         (Side::A, Side::B)
@@ -213,6 +223,7 @@ impl Interface {
             size_mm: 2.5,
             joints,
             hold,
+            lines: Vec::new(),
         }
     }
 }
@@ -224,7 +235,7 @@ pub fn contacts(
     seams: &[Seam],
     sizes: &ConnectorSizes,
 ) -> Vec<Interface> {
-    let obstructions = Obstructions::new(params, surface);
+    let obstructions = Obstructions::new(params.wall_mm, &surface.mesh, surface.patch_of_face.as_slice());
     let inner = |seam: &Seam| lines(params, sizes.of(seam.a, seam.b), seam, obstructions.as_ref());
     let mut measured: Vec<(&Seam, Vec<Line>)> = seams.par_iter().map(|seam| (seam, inner(seam))).collect();
     measured.sort_by_key(|(seam, _)| (seam.a, seam.b));
@@ -263,6 +274,7 @@ fn contact(params: &PlanParams, sizes: &ConnectorSizes, seams: &[(&Seam, Vec<Lin
         size_mm,
         joints,
         hold,
+        lines: seams.iter().flat_map(|(_, lines)| lines).cloned().collect(),
     })
 }
 

@@ -16,6 +16,10 @@ pub struct PlanParams {
     pub wall_mm: f64,
     /// Gap between mating faces. [0.03, 0.6]; 0.12. A push must cross this gap before it is resisted.
     pub clearance_mm: f64,
+    /// Gap between the walls of two pieces. [0, 0.8]; 0.1.
+    pub wall_gap_mm: f64,
+    /// Gap between the walls of the key and of its neighbours. [0, 0.8]; 0.15.
+    pub key_gap_mm: f64,
     /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
     ///
     /// Keeps a perfect connector from costing nothing at all.
@@ -53,6 +57,8 @@ impl Default for PlanParams {
             seed: 0,
             wall_mm: 0.0,
             clearance_mm: 0.12,
+            wall_gap_mm: 0.1,
+            key_gap_mm: 0.15,
             beta: 0.1,
             occlusion_tolerance: 0.01,
             relaxed_tolerance: 0.03,
@@ -82,6 +88,8 @@ impl PlanParams {
         };
         range("wall_mm", self.wall_mm, 0.0, 10.0);
         range("clearance_mm", self.clearance_mm, 0.03, 0.6);
+        range("wall_gap_mm", self.wall_gap_mm, 0.0, 0.8);
+        range("key_gap_mm", self.key_gap_mm, 0.0, 0.8);
         range("beta", self.beta, 0.0, 1.0);
         range("occlusion_tolerance", self.occlusion_tolerance, 0.0, 0.2);
         range(

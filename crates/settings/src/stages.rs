@@ -79,6 +79,8 @@ impl Settings {
             plan: PlanParams {
                 wall_mm: thickness_mm,
                 clearance_mm,
+                wall_gap_mm: 2.0 * seam_gap_mm,
+                key_gap_mm: 2.0 * seam_gap_mm,
                 ..plan(params)
             },
             body: BodyParams {
@@ -105,6 +107,7 @@ impl Settings {
             plan: PlanParams {
                 key: Some(key),
                 key_slide: Some(slide),
+                key_gap_mm: 2.0 * key_gap_mm,
                 ..self.plan.clone()
             },
             body: BodyParams {

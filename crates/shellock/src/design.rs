@@ -69,7 +69,16 @@ pub fn design(
     let params = &resolve_params(params, model, labels)?;
     let input = Input::new(params, model, labels);
     let grade = |kit: &Kit| (kit.grade(), kit.failures());
-    let (best, agenda, effort) = run(ctx, input, attempt::make_kit, grade)?;
+    let agenda = Agenda::new(ctx, &input);
+    let (mut best, mut agenda, mut effort) = run(ctx, input, agenda, attempt::make_kit, grade)?;
+    if agenda.has_stopped_kits() && !best.has_end() {
+        // Fewer pieces have no kit, so one that rattles is better than none.
+        ctx.note("no kit has less play: now one that rattles");
+        let before = effort;
+        agenda = Agenda::new(ctx, &input).without_stops();
+        (best, agenda, effort) = run(ctx, input, agenda, attempt::make_kit, grade)?;
+        effort = before.and(effort);
+    }
     best.conclude(ctx, &input, &agenda, effort)
 }
 
@@ -77,10 +86,10 @@ pub fn design(
 fn run<'a, T>(
     ctx: &Ctx,
     input: Input<'a>,
+    mut agenda: Agenda,
     attempt: impl Fn(&Ctx<'_>, Parts<'_, 'a>, &Allowance) -> Result<Found<T>, DesignError>,
     grade: impl Fn(&T) -> (Grade, Vec<String>),
 ) -> Result<(Best<T>, Agenda, Effort), DesignError> {
-    let mut agenda = Agenda::new(ctx, &input);
     let Some(wall) = in_time(ctx, |part| Wall::decide(part, &input))? else {
         agenda.end_late();
         return Ok((Best::new(), agenda, Effort::default()));
@@ -127,6 +136,7 @@ fn explore<'a, T>(
             Ok(Some(found)) => {
                 report.offers = found.changes.iter().map(Change::step).collect();
                 (report.late, report.is_hurried) = (found.late, found.is_hurried);
+                report.is_stopped = found.is_stopped;
                 changes = found.changes;
                 best.fail(found.failure);
                 if let Some(end) = found.end {
@@ -246,6 +256,7 @@ pub fn plan(
     let params = &resolve_params(params, model, labels)?;
     let input = Input::new(params, model, labels);
     let grade = |_: &Planned| (Grade::PERFECT, Vec::new());
-    let (best, agenda, _) = run(ctx, input, attempt::seek_plan, grade)?;
+    let agenda = Agenda::new(ctx, &input);
+    let (best, agenda, _) = run(ctx, input, agenda, attempt::seek_plan, grade)?;
     best.conclude(ctx, &agenda)
 }

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
+use super::folds::faces_turned_inwards;
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -61,6 +62,9 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
         check("no edge shared by four faces", |f| {
             matches!(f, Finding::SharedEdges { .. })
         }),
+        check("no surface folds back on itself", |f| {
+            matches!(f, Finding::Folded { .. })
+        }),
         check("every piece one connected body", |f| {
             matches!(f, Finding::SeveralBodies { .. })
         }),
@@ -88,6 +92,7 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     match &volume {
         None => defects.push(Finding::NotClosed { piece }),
         Some(volume) => {
+            defects.extend(fold(piece, &mesh));
             let count = volume
                 .components()
                 .iter()
@@ -103,6 +108,17 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
         volume,
         defects,
     }
+}
+
+/// Fold of a closed mesh, if there is one.
+fn fold(piece: PatchId, mesh: &TriMesh) -> Option<Finding> {
+    let folded = faces_turned_inwards(mesh);
+    let [a, b, c] = mesh.corners(*folded.first()?);
+    Some(Finding::Folded {
+        piece,
+        count: folded.len(),
+        at: ((a + b + c) / 3.0).to_array(),
+    })
 }
 
 /// Returns `mesh`, unless it refers to points that do not exist, or has coordinates that are not finite.

@@ -43,6 +43,11 @@ impl Finding {
                 "{count} edges of piece {piece} have more than two triangles, first {}",
                 words.place(*at)
             ),
+            Self::Folded { piece, count, at } => format!(
+                "the surface of piece {piece} folds back on itself: {count} faces have material right in \
+                 front of them, first {}; another number of pieces avoids it",
+                words.place(*at)
+            ),
             Self::SeveralBodies { piece, count } => format!("piece {piece} falls into {count} bodies"),
             Self::Overlap { a, b, volume_mm3, at } => format!(
                 "pieces {a} and {b} overlap by {volume_mm3:.2} mm³ {}",

@@ -3,6 +3,7 @@
 use crate::causes::Cause;
 use rayon::prelude::*;
 use shellock_assembly::PressFit;
+use shellock_assembly::motion::Contact;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
 use shellock_geom::rounding::{NotPrintable, printable_body};
@@ -17,7 +18,7 @@ use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
 use crate::body::{ShellBodies, ShellGrid};
-use crate::connector::{ConnectorParams, Run};
+use crate::connector::{ConnectorParams, Run, contacts};
 
 /// Distance of ribs from the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
@@ -83,35 +84,55 @@ pub struct FinishParams<'a> {
     pub turn: Turn,
 }
 
-/// Carves every half connector in the disassembly sequence and joins it to its body. Cuts off what comes too
-/// near to other pieces. Gives a key its detents and its notch, and every piece its number.
+/// Connectors of a kit before they are joined to the bodies: runs with their carved halves.
+pub struct Connectors(Vec<Carved>);
+
+impl Connectors {
+    /// Carves every half connector in the disassembly sequence.
+    pub fn carve(
+        ctx: &Ctx,
+        params: &ConnectorParams,
+        grid: &ShellGrid,
+        shell: &ShellBodies,
+        plan: &LatticePlan,
+        runs: &[Run],
+        rooms: &IdVec<PatchId, Aabb>,
+    ) -> Result<Self, Cancelled> {
+        let all = |b: Aabb, r: &Aabb| b.union(*r);
+        let carver = Carver {
+            ctx,
+            params,
+            grid,
+            shell,
+            plan,
+            far_mm: rooms.as_slice().iter().fold(Aabb::EMPTY, all).diagonal(),
+        };
+        carver.carve(runs).map(Self)
+    }
+
+    /// Places where pins touch their channels, each a clearance apart.
+    pub fn contacts(&self, params: &ConnectorParams) -> Vec<Contact> {
+        self.0
+            .iter()
+            .flat_map(|made| contacts(params, &made.run))
+            .collect()
+    }
+}
+
+/// Joins connectors to their bodies and cuts off what comes too near to other pieces. Gives a key its detents
+/// and its notch, and every piece its number.
 pub fn make(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
     grid: &ShellGrid,
     shell: &ShellBodies,
     plan: &LatticePlan,
-    runs: &[Run],
-    rooms: &IdVec<PatchId, Aabb>,
+    Connectors(carved): &Connectors,
 ) -> Result<Finished, PieceError> {
     let params = finish.connector;
-    let far_mm = rooms
-        .as_slice()
-        .iter()
-        .fold(Aabb::EMPTY, |b, r| b.union(*r))
-        .diagonal();
-    let carver = Carver {
-        ctx,
-        params,
-        grid,
-        shell,
-        plan,
-        far_mm,
-    };
-    let carved = carver.carve(runs)?;
     let kept: Vec<Run> = carved.iter().map(|made| made.run.clone()).collect();
     ctx.stage("pieces", plan.steps.len())?;
-    let mut pieces = unite(shell, &carved);
+    let mut pieces = unite(shell, carved);
     relieve(ctx, &finish.relief, plan, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
     changes.extend(

@@ -11,15 +11,15 @@
 //! ```
 //!
 //! Round thin limbs, where the far wall is near, little more than the limb's axis remains as a direction.
-//! Limits: only the two pieces of the seam are checked, since the order of the others is not known yet.
+//! As long as the order of the pieces is not known, only the two pieces of the seam are checked
+//! ([`Blocked`]). For a whole plan the same rays tell of all pieces ([`Sights::is_blocked`]).
 
 use shellock_assembly::LatticeDirection;
-use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{TriMesh, Vec3};
 use shellock_report::PatchId;
-use shellock_surface::SegmentedSurface;
 
-use crate::PlanParams;
+use crate::{LatticePlan, LatticeStep, PieceSet};
 
 /// Position at which a half connector is checked, in connector sizes: below the wall and beside the seam.
 const DEPTH_SIZES: f64 = 0.5;
@@ -38,11 +38,87 @@ const MOST_WALLS: usize = 8;
 const PAST_WALL_MM: f64 = 0.01;
 
 /// The surface as rays see it.
-pub(super) struct Obstructions<'a> {
-    surface: &'a SegmentedSurface,
+pub struct Obstructions<'a> {
+    mesh: &'a TriMesh,
+    patch_of_face: &'a [PatchId],
     bvh: TriangleBvh,
     wall_mm: f64,
     far_mm: f64,
+}
+
+/// Way of a piece out of a kit.
+#[derive(Clone, Copy, Debug)]
+pub struct Leave {
+    /// The piece that leaves.
+    pub piece: PatchId,
+    /// Direction in which it leaves.
+    pub s: LatticeDirection,
+    /// Place of the piece in the order of installation.
+    pub place: usize,
+}
+
+impl Leave {
+    /// Ways of all pieces of a plan.
+    pub fn all(plan: &LatticePlan) -> Vec<Self> {
+        let leave = |(place, step): (usize, &LatticeStep)| Self {
+            piece: step.piece,
+            s: step.separation,
+            place,
+        };
+        plan.steps.iter().enumerate().map(leave).collect()
+    }
+}
+
+/// Pieces that rays from the two halves of a connector between patches a and b meet along the lattice
+/// directions: first from the half on the side of a, then from the other.
+#[derive(Clone, Debug)]
+pub struct Sights {
+    seen: [[PieceSet; LatticeDirection::COUNT]; 2],
+    normal: Vec3,
+}
+
+impl Sights {
+    /// Returns true if the connector has no free way. `leaves` are the pieces that count as obstacles, the
+    /// connector's own two among them.
+    pub fn is_blocked(&self, pair: [PatchId; 2], a_is_later: bool, leaves: &[Leave]) -> bool {
+        let of = |piece: PatchId| {
+            leaves
+                .iter()
+                .find(|l| l.piece == piece)
+                .expect("both pieces leave")
+        };
+        let own = pair.map(of);
+        let later = usize::from(!a_is_later);
+        let later_is_male = own[later].s.unit().dot(self.normal) >= 0.0;
+        let male = if later_is_male { later } else { 1 - later };
+        // The channel reaches under the male's wall, so parts of both pieces lie on that side.
+        [(0, 0), (1, 1), (male, 1 - male)]
+            .into_iter()
+            .any(|(side, owner)| {
+                leaves.iter().any(|other| {
+                    let along = match other.place.cmp(&own[owner].place) {
+                        std::cmp::Ordering::Less => own[owner].s,
+                        std::cmp::Ordering::Greater => other.s.opposite(),
+                        std::cmp::Ordering::Equal => return false,
+                    };
+                    self.seen[side][along.index()].contains(other.piece)
+                })
+            })
+    }
+
+    /// Orders and directions in which one of the two pieces blocks the connector between them.
+    pub(super) fn blocked(&self, [a, b]: [PatchId; 2]) -> Blocked {
+        let mut blocked = 0;
+        for (order, [later, earlier]) in [[a, b], [b, a]].into_iter().enumerate() {
+            for s in LatticeDirection::all() {
+                let leave = |piece, place| Leave { piece, s, place };
+                if self.is_blocked([a, b], later == a, &[leave(later, 1), leave(earlier, 0)]) {
+                    blocked |= 1 << (order * LatticeDirection::COUNT + s.index());
+                }
+            }
+        }
+        Blocked(blocked)
+    }
 }
 
 /// One bit for each blocked pair of an order (0 if the piece with the lower id is later) and a direction.
@@ -58,12 +134,13 @@ impl Blocked {
 
 impl<'a> Obstructions<'a> {
     /// Prepares the surface for rays. `None` if walls have no thickness, so that there is no room to check.
-    pub fn new(params: &PlanParams, surface: &'a SegmentedSurface) -> Option<Self> {
-        (params.wall_mm > 0.0).then(|| Self {
-            surface,
-            bvh: TriangleBvh::new(&surface.mesh),
-            wall_mm: params.wall_mm,
-            far_mm: surface.mesh.bounds().diagonal(),
+    pub fn new(wall_mm: f64, mesh: &'a TriMesh, patch_of_face: &'a [PatchId]) -> Option<Self> {
+        (wall_mm > 0.0).then(|| Self {
+            mesh,
+            patch_of_face,
+            bvh: TriangleBvh::new(mesh),
+            wall_mm,
+            far_mm: mesh.bounds().diagonal(),
         })
     }
 
@@ -76,7 +153,7 @@ impl<'a> Obstructions<'a> {
                 return Some(point);
             };
             let inwards = (point - near.point).try_normalize()?;
-            if inwards.dot(self.surface.mesh.face_normal(near.face as usize)) >= 0.0 {
+            if inwards.dot(self.mesh.face_normal(near.face as usize)) >= 0.0 {
                 return None;
             }
             point = near.point + self.wall_mm * inwards;
@@ -84,54 +161,24 @@ impl<'a> Obstructions<'a> {
         None
     }
 
-    /// Orders and directions in which a connector of `size_mm` between `a` and `b` is obstructed. The
-    /// connector lies below `point` of the outer surface; `across` leads from a to b.
-    pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Blocked {
+    /// Pieces that the two halves of a connector of `size_mm` see along all directions. The connector lies
+    /// below `point` of the outer surface; `across` leads from the first half to the second.
+    pub fn sights(&self, size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Sights {
         let height_mm = self.wall_mm + DEPTH_SIZES * size_mm;
         let below = point - height_mm * normal;
         let beside = BESIDE_SIZES * size_mm * across;
-        let (in_a, in_b) = (below - beside, below + beside);
-        let seen = |origin: Vec3| {
-            LatticeDirection::all()
-                .map(|s| self.met(origin, normal, height_mm, s, [a, b]))
-                .collect()
-        };
-        let (from_a, from_b): (Vec<[bool; 2]>, Vec<[bool; 2]>) = (seen(in_a), seen(in_b));
-        let mut blocked = 0;
-        for s in LatticeDirection::all() {
-            let (on, back) = (s.index(), s.opposite().index());
-            let later_is_male = s.unit().dot(normal) >= 0.0;
-            // For each order: hits from the later and from the earlier piece's side, and the indices of the
-            // two patches.
-            for (order, (later, earlier, own, other)) in [(&from_a, &from_b, 0, 1), (&from_b, &from_a, 1, 0)]
-                .into_iter()
-                .enumerate()
-            {
-                // The channel reaches under the male's wall, so one of the halves lies on the other piece's
-                // side as well.
-                let channel = if later_is_male {
-                    later[back][own]
-                } else {
-                    earlier[on][other]
-                };
-                if later[on][other] || earlier[back][own] || channel {
-                    blocked |= 1 << (order * LatticeDirection::COUNT + on);
-                }
+        let mut seen = [[PieceSet::EMPTY; LatticeDirection::COUNT]; 2];
+        for (half, origin) in seen.iter_mut().zip([below - beside, below + beside]) {
+            for s in LatticeDirection::all() {
+                half[s.index()] = self.met(origin, normal, height_mm, s);
             }
         }
-        Blocked(blocked)
+        Sights { seen, normal }
     }
 
-    /// Tells for each of two patches if the ray along `s` hits it. The ray starts at `origin`, `height_mm`
-    /// below the surface; the wall right above does not count.
-    fn met(
-        &self,
-        origin: Vec3,
-        normal: Vec3,
-        height_mm: f64,
-        s: LatticeDirection,
-        patches: [PatchId; 2],
-    ) -> [bool; 2] {
+    /// Pieces that the ray along `s` meets. The ray starts at `origin`, `height_mm` below the surface; the
+    /// wall right above does not count.
+    fn met(&self, origin: Vec3, normal: Vec3, height_mm: f64, s: LatticeDirection) -> PieceSet {
         let along = s.unit();
         let up = along.dot(normal);
         let mut travel_mm = if up > LEAVES_ABOVE {
@@ -139,14 +186,13 @@ impl<'a> Obstructions<'a> {
         } else {
             0.0
         };
-        let mut met = [false; 2];
+        let mut met = PieceSet::EMPTY;
         for _ in 0..MOST_WALLS {
             let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm)
             else {
                 break;
             };
-            let patch = self.surface.patch_of_face[face as usize];
-            met = [met[0] || patch == patches[0], met[1] || patch == patches[1]];
+            met = met.union(PieceSet::one(self.patch_of_face[face as usize]));
             travel_mm += on_mm + PAST_WALL_MM;
         }
         met

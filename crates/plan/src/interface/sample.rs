@@ -13,7 +13,7 @@ use shellock_surface::seam::rules::{SHARPEST_TURN, SHORTEST_RAIL_SIZES, SHORTEST
 use shellock_surface::seam::{FramedLine, later_is_male};
 
 use super::SeamFrame;
-use super::obstruction::{Blocked, Obstructions};
+use super::obstruction::{Blocked, Obstructions, Sights};
 use crate::PlanParams;
 
 /// Distance between the points of a seam that are moved inwards, mm: below the size of any connector.
@@ -23,8 +23,10 @@ const STEP_MM: f64 = 1.0;
 const FARTHEST_STEPS: f64 = 2.5;
 
 /// One place on the inner edge of the wall, in the frame of connectors.
-#[derive(Clone, Copy)]
+#[derive(Clone, Debug)]
 pub(super) struct Sample {
+    /// Point on the inner edge.
+    pub point: Vec3,
     pub tangent: Vec3,
     pub normal: Vec3,
     /// Unit vector perpendicular to both, from the piece with the lower id to the other.
@@ -36,6 +38,8 @@ pub(super) struct Sample {
     /// True if the place is far enough from the ends of an open line.
     pub has_room: bool,
     pub obstruction: Blocked,
+    /// Pieces in the way of a connector; `None` where there is no room for one.
+    pub sights: Option<Sights>,
 }
 
 impl Sample {
@@ -97,7 +101,7 @@ impl Way {
 
 /// Kind of connector at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Rail,
     Pin { later_is_male: bool },
 }
@@ -114,7 +118,7 @@ impl Kind {
 
 /// One run of connectors under a line, as long as angles allow.
 pub(super) struct Run {
-    kind: Kind,
+    pub kind: Kind,
     /// Indices of its samples, in order along the line.
     pub samples: Vec<usize>,
     /// Length of edge that its samples stand for, mm.
@@ -131,6 +135,7 @@ impl Run {
 }
 
 /// One connected inner edge below a seam.
+#[derive(Clone, Debug)]
 pub(super) struct Line {
     pub samples: Vec<Sample>,
     pub is_loop: bool,
@@ -140,7 +145,12 @@ impl Line {
     /// Runs of connectors for one order and direction, however short. On a loop, a run may continue from the
     /// last sample to the first.
     pub fn runs(&self, way: Way) -> Vec<Run> {
-        let kinds = self.kinds(way);
+        self.runs_where(way, &|_| true)
+    }
+
+    /// Runs of connectors at samples that are clear, however short, as [`runs`](Self::runs) gives them.
+    pub fn runs_where(&self, way: Way, is_clear: &dyn Fn(&Sample) -> bool) -> Vec<Run> {
+        let kinds = self.kinds(way, is_clear);
         let n = kinds.len();
         let before = |i: usize| if i == 0 { n - 1 } else { i - 1 };
         // A loop is walked from the start of a run, so that the first sample cuts none.
@@ -173,7 +183,7 @@ impl Line {
 
     /// Returns the kind of connector possible at each sample. None is possible beside a change of the male
     /// piece or a sharp turn, because no profile can be swept over them.
-    fn kinds(&self, way: Way) -> Vec<Option<Kind>> {
+    fn kinds(&self, way: Way, is_clear: &dyn Fn(&Sample) -> bool) -> Vec<Option<Kind>> {
         let n = self.samples.len();
         let normals: Vec<Vec3> = self.samples.iter().map(|x| x.normal).collect();
         let later_is_male = later_is_male(&normals, way.s.unit(), self.is_loop);
@@ -189,7 +199,7 @@ impl Line {
             if way.has_rail(x) {
                 return Some(Kind::Rail);
             }
-            (goes_on(i) && goes_on(i + 1) && way.has_pin(x)).then(|| Kind::Pin {
+            (goes_on(i) && goes_on(i + 1) && way.has_pin(x) && is_clear(x)).then(|| Kind::Pin {
                 later_is_male: later_is_male[i],
             })
         };
@@ -284,22 +294,24 @@ fn line(
         let across = -normal.cross(tangent);
         let has_room = arcs_mm[i] >= end_mm && arcs_mm[i] <= total_mm - end_mm;
         let outside = framed.points[i] + params.wall_mm * normal;
-        let blocked = obstructions
+        let sights = obstructions
             .filter(|_| has_room)
-            .map(|o| o.at(pair, size_mm, outside, normal, across));
+            .map(|o| o.sights(size_mm, outside, normal, across));
         let before = match i {
             0 if is_loop => step(n - 1),
             0 => 0.0,
             i => step(i - 1),
         };
         Sample {
+            point: framed.points[i],
             tangent,
             normal,
             across,
             length_mm: 0.5 * (before + step(i)),
             next_mm: step(i),
             has_room,
-            obstruction: blocked.unwrap_or_default(),
+            obstruction: sights.as_ref().map(|s| s.blocked(pair)).unwrap_or_default(),
+            sights,
         }
     };
     Line {
@@ -369,7 +381,7 @@ mod tests {
             wall_mm: 2.0,
             ..PlanParams::default()
         };
-        let walls = Obstructions::new(&params, &block).unwrap();
+        let walls = Obstructions::new(params.wall_mm, &block.mesh, &block.patch_of_face).unwrap();
         let depth = params.wall_mm;
         let corner = Vec3::new(20.0, depth, depth);
         // Below the side, nearer to the floor; and below the edge itself.
@@ -387,7 +399,7 @@ mod tests {
             1,
             |_| 0,
         );
-        let walls = Obstructions::new(&params, &plate).unwrap();
+        let walls = Obstructions::new(params.wall_mm, &plate.mesh, &plate.patch_of_face).unwrap();
         assert_eq!(walls.at_depth(Vec3::new(20.0, 20.0, 0.6 * depth)), None);
     }
 

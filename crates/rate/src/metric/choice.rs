@@ -14,7 +14,7 @@ use super::climb::{Ascent, ClimbError, ClimbRules, Climbed};
 use super::foresight::{COST_SLACK, Foresight};
 use super::question::Choice;
 use super::rating::{Bench, Rated};
-use super::{Deformed, Foreseen, PlanModel, foreseen};
+use super::{Deformed, Foreseen, PlanModel};
 use crate::handling::{Borne, DROP_MM, Deed, Failure, LoadCase};
 
 /// Relative difference below which costs count as equal, against rounding.
@@ -236,7 +236,7 @@ pub fn choose_or_change<T>(
         Err(changed) => return Ok(Err(changed)),
     };
     let chosen = climbed.best.candidate.clone();
-    let holding = hold(choice, model, &bench, &climbed)?;
+    let holding = hold(foresight, &bench, &climbed)?;
     warn(ctx, model, &holding, &chosen);
     let deformation = Deformed::of(model, &bench, &climbed.best, &holding.bears)?;
     found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
@@ -252,24 +252,13 @@ pub fn choose_or_change<T>(
 }
 
 /// Resistance of the plan that was climbed to.
-fn hold(
-    choice: &Choice<'_>,
-    model: &PlanModel,
-    bench: &Bench<'_>,
-    climbed: &Climbed<'_>,
-) -> Result<Holding, ChoiceError> {
-    let (best, plan) = (&climbed.best, &climbed.best.candidate.plan);
+fn hold(foresight: &Foresight, bench: &Bench<'_>, climbed: &Climbed<'_>) -> Result<Holding, ChoiceError> {
+    let (best, plan, model) = (&climbed.best, &climbed.best.candidate.plan, &foresight.model);
     let solved = bench.surface.resist(&best.meetings, plan.key().0)?;
     let Foreseen {
         play: foreseen_play,
         excess: foreseen_excess,
-    } = foreseen(
-        model,
-        plan,
-        &best.meetings,
-        choice.surface.mesh.bounds().size().max_element(),
-        choice.params.clearance_mm,
-    );
+    } = foresight.play(plan);
     Ok(Holding {
         n_compared: climbed.n_plans,
         foreseen_play,

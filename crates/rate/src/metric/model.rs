@@ -1,14 +1,15 @@
 //! The segmented surface as parts and stations, and the joints that a plan makes of the stations.
 
+use rayon::prelude::*;
 use shellock_assembly::LatticeDirection;
 use shellock_geom::remesh::{RemeshParams, Remeshed, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
 use shellock_mechanics::{Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams};
-use shellock_plan::interface::meeting;
+use shellock_plan::interface::{Leave, Obstructions, Sights, meeting};
 use shellock_plan::sizes::ConnectorSizes;
-use shellock_plan::{LatticePlan, PlanParams};
+use shellock_plan::{LatticePlan, PieceSet, PlanParams};
 use shellock_report::ParamProblem;
 use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
@@ -106,6 +107,9 @@ pub struct PlanModel {
     /// Parameters of the model.
     pub params: MetricParams,
     seams: Vec<StationSeam>,
+    /// Pieces in the way of a connector, at three places of each station; none if walls have no thickness, or
+    /// if there are too many pieces for a plan.
+    sights: Vec<[Sights; 3]>,
 }
 
 /// Seam of a station, with its pieces and its room.
@@ -180,6 +184,7 @@ impl PlanModel {
             assembly: parts(mesh, labels, n_parts),
             params: *params,
             seams: Vec::new(),
+            sights: Vec::new(),
         };
         let topology = Topology::of_mesh(mesh).expect("a remeshed surface is closed");
         let normals = point_normals(mesh);
@@ -211,7 +216,25 @@ impl PlanModel {
             let [a, b] = [PatchId(s.a), PatchId(s.b)];
             model.add_seam([a, b], sizes.of(a, b), &points);
         }
+        let patch_of_face: Vec<PatchId> = labels.iter().map(|&l| PatchId(l)).collect();
+        let obstructions = Obstructions::new(params.wall_mm, mesh, &patch_of_face);
+        if let Some(obstructions) = obstructions.filter(|_| n_parts <= PieceSet::MAX_PIECES) {
+            model.sights = model.look(&obstructions);
+        }
         model
+    }
+
+    /// Pieces in the way of a connector, at three places of each station's stretch.
+    fn look(&self, obstructions: &Obstructions<'_>) -> Vec<[Sights; 3]> {
+        const PLACES: [f64; 3] = [-1.0 / 3.0, 0.0, 1.0 / 3.0];
+        let of_station = |i: usize| {
+            let (seam, at) = (&self.seams[i], &self.assembly.stations[i]);
+            PLACES.map(|share| {
+                let place = self.place_of(i) + share * at.length_mm * at.tangent;
+                obstructions.sights(seam.size_mm, place, at.normal, at.across)
+            })
+        };
+        (0..self.seams.len()).into_par_iter().map(of_station).collect()
     }
 
     /// Adds the stations of a seam, with patch a on its left: all points but the ends; of a loop all points
@@ -296,13 +319,14 @@ impl PlanModel {
             .iter()
             .enumerate()
             .for_each(|(i, s)| position[usize::from(s.piece)] = i);
-        let meet = |(seam, station): (&StationSeam, &Station)| {
+        let leaves = Leave::all(plan);
+        let meet = |(i, seam): (usize, &StationSeam)| {
             let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
             let later = if a_is_later { seam.a } else { seam.b };
             let s = plan.steps[position[usize::from(later)]].separation;
             let on_rails = self.params.rails == Some((later, s));
             let mut meeting = meeting(
-                station,
+                &self.assembly.stations[i],
                 seam.size_mm,
                 a_is_later,
                 s.unit(),
@@ -310,13 +334,20 @@ impl PlanModel {
                 false,
                 on_rails,
             );
-            meeting.joint = meeting.joint.filter(|_| seam.has_room);
+            let is_blocked = || {
+                let blocks = |s: &&Sights| s.is_blocked([seam.a, seam.b], a_is_later, &leaves);
+                let sights = self.sights.get(i);
+                sights.is_some_and(|sights| 2 * sights.iter().filter(blocks).count() > sights.len())
+            };
+            meeting.joint = meeting
+                .joint
+                .filter(|_| seam.has_room && (on_rails || !is_blocked()));
             if let Some(joint) = &mut meeting.joint {
                 joint.is_fast = later == plan.key();
             }
             meeting
         };
-        self.seams.iter().zip(&self.assembly.stations).map(meet).collect()
+        self.seams.iter().enumerate().map(meet).collect()
     }
 
     /// The two pieces at a station.

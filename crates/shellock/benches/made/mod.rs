@@ -4,7 +4,7 @@
 use shellock::body::{PatchDistances, ShellBodies, ShellGrid};
 use shellock::connector::{self, Run, is_unobstructed};
 use shellock::key::Turn;
-use shellock::piece::{self, FinishParams, Finished, LabelParams, Relief};
+use shellock::piece::{self, Connectors, FinishParams, Finished, LabelParams, Relief};
 use shellock::plan::{LatticePlan, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::Assembly;
 use shellock::{
@@ -137,5 +137,8 @@ pub fn finish(
         turn: Turn::default(),
     };
     let rooms = rooms(settings, surface, sizes);
-    piece::make(&Ctx::quiet(), &params, grid, shell, plan, runs, &rooms).expect("pieces can be written")
+    let ctx = Ctx::quiet();
+    let connectors = Connectors::carve(&ctx, &settings.connector, grid, shell, plan, runs, &rooms);
+    let connectors = connectors.expect("nobody stops it");
+    piece::make(&ctx, &params, grid, shell, plan, &connectors).expect("pieces can be written")
 }

@@ -74,6 +74,8 @@ pub(super) struct Allowance {
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
+    /// True if a kit may be given up before it is finished, for other pieces: another one is allowed then.
+    pub may_stop_kit: bool,
     /// Time to keep back for the kit while its plan is improved, s.
     pub kit_reserve_s: f64,
     /// Time without which the kit is not begun, s.
@@ -161,6 +163,8 @@ pub(super) struct Report {
     pub late: Option<Step>,
     /// True if the plan would have been improved further if more time were left.
     pub is_hurried: bool,
+    /// True if a kit was given up before it was finished.
+    pub is_stopped: bool,
 }
 
 /// Cost of a job in work, which is the same on any machine, and the list of what was tried.
@@ -179,6 +183,18 @@ pub struct Effort {
     pub steps: Vec<String>,
 }
 
+impl Effort {
+    /// Returns the cost of two runs of a job, one after the other.
+    pub(super) fn and(mut self, then: Self) -> Self {
+        self.keys += then.keys;
+        self.segmentations += then.segmentations;
+        self.plans += then.plans;
+        self.kits += then.kits;
+        self.steps.extend(then.steps);
+        self
+    }
+}
+
 /// Order of trials, with the counts and the clock that decide it.
 pub(super) struct Agenda {
     ways: Vec<Way>,
@@ -186,7 +202,7 @@ pub(super) struct Agenda {
     /// Steps that the user's parameters rule out.
     forbidden: Vec<Step>,
     counts: [usize; TABLE.len()],
-    /// Kits made with the present key.
+    /// Kits begun with the present key.
     n_kits: usize,
     /// Places for a key, of which the last is a piece as it is.
     n_keys: usize,
@@ -196,6 +212,10 @@ pub(super) struct Agenda {
     of_key: Option<Grade>,
     /// Cut keys of the present wall, before the present one, whose best kits only rattle.
     n_rattling: usize,
+    /// True if kits may be given up before they are finished.
+    may_stop: bool,
+    /// True if a kit was given up before it was finished.
+    has_stopped: bool,
     clock: Clock,
     steps: Vec<Step>,
 }
@@ -240,9 +260,24 @@ impl Agenda {
             best: None,
             of_key: None,
             n_rattling: 0,
+            may_stop: true,
+            has_stopped: false,
             clock,
             steps: Vec::new(),
         }
+    }
+
+    /// The agenda with every kit that is begun finished.
+    pub fn without_stops(self) -> Self {
+        Self {
+            may_stop: false,
+            ..self
+        }
+    }
+
+    /// True if a kit was given up before it was finished, since other pieces promised less play.
+    pub fn has_stopped_kits(&self) -> bool {
+        self.has_stopped
     }
 
     /// Present way to divide.
@@ -304,6 +339,9 @@ impl Agenda {
             least_factor: self.least_factor(),
             may_end_climb: !self.is_wall_thick(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
+            may_stop_kit: self.may_stop
+                && self.n_kits + 1 < self.most_kits()
+                && self.permit(ctx, Step::JoinRattling) == Permit::Yes,
             kit_reserve_s: self.clock.kit_reserve_s(),
             least_kit_s: self.clock.least_kit_s(),
         }
@@ -315,6 +353,10 @@ impl Agenda {
         self.clock.is_cut_short |= report.is_hurried;
         if let Some(grade) = report.kit {
             self.count_kit(ctx, grade);
+        }
+        if report.is_stopped {
+            self.has_stopped = true;
+            self.n_kits += 1;
         }
         if let Some(step) = report.late {
             self.skip(ctx, step);

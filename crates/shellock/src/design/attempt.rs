@@ -1,5 +1,7 @@
 //! One attempt: the plan of a trial, and the kit that is made of it.
 
+use shellock_assembly::motion::Contact;
+
 use super::agenda::{Allowance, Step};
 use super::division::{Division, revise};
 use super::failure::Failure;
@@ -31,6 +33,8 @@ pub(super) struct Found<T> {
     pub late: Option<Step>,
     /// True if a lack of time ended the improvement of its plan.
     pub is_hurried: bool,
+    /// True if a kit was given up before it was finished.
+    pub is_stopped: bool,
 }
 
 impl<T> Found<T> {
@@ -42,6 +46,7 @@ impl<T> Found<T> {
             changes: Vec::new(),
             late: None,
             is_hurried: false,
+            is_stopped: false,
         }
     }
 
@@ -59,7 +64,7 @@ pub(super) fn make_kit(
 ) -> Result<Found<Kit>, DesignError> {
     // Warnings of a kit that is given up are dropped with it, so they get a context of their own.
     let kit_ctx = ctx.fork();
-    let (choice, late) = match plan_or_changes(ctx, &kit_ctx, &mut parts, allowance)? {
+    let (choice, foresight, late) = match plan_or_changes(ctx, &kit_ctx, &mut parts, allowance)? {
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
@@ -84,10 +89,30 @@ pub(super) fn make_kit(
         choice,
     };
     let learned = &mut setup.lessons;
-    let found = match make(kit_ctx, recipe) {
-        Ok(kit) => {
+    // Pieces that rattle are known as soon as the connectors are.
+    let join_rattlers = |plan: &LatticePlan, joints: &[Contact]| {
+        let rattling = foresight.rattlers_with(plan, joints);
+        if rattling.is_empty() || !allowance.may_stop_kit {
+            return Ok(None);
+        }
+        Ok(join(
+            ctx,
+            &division.settings.segmentation,
+            &division.surface,
+            &rattling,
+        )?)
+    };
+    let found = match make(kit_ctx, recipe, join_rattlers) {
+        Ok(Ok(kit)) => {
             parts.effort.kits += 1;
             learn(ctx, division, learned, kit, allowance)?
+        }
+        Ok(Err(fewer)) => {
+            let change = Change::Divide(Step::JoinRattling, fewer, None);
+            Found {
+                is_stopped: true,
+                ..Found::nothing(Failure::of("pieces rattle")).with(Some(change))
+            }
         }
         // A piece that cannot take enough of its wall along costs only the plan.
         Err(DesignError::Make(MakeError::Body(BodyError::Blocked {
@@ -119,7 +144,7 @@ pub(super) fn seek_plan(
     allowance: &Allowance,
 ) -> Result<Found<Planned>, DesignError> {
     let plan_ctx = ctx.fork();
-    let (choice, late) = match plan_or_changes(ctx, &plan_ctx, &mut parts, allowance)? {
+    let (choice, _, late) = match plan_or_changes(ctx, &plan_ctx, &mut parts, allowance)? {
         Ok(plan) => plan,
         Err(found) => return Ok(found),
     };
@@ -134,8 +159,9 @@ pub(super) fn seek_plan(
     })
 }
 
-/// A plan to make, with the step that a lack of time rules out; or the changes to make instead.
-type Decision<T> = Result<(Chosen, Option<Step>), Found<T>>;
+/// A plan to make, with what is expected of it and the step that a lack of time rules out; or the changes to
+/// make instead.
+type Decision<T> = Result<(Chosen, Foresight, Option<Step>), Found<T>>;
 
 /// Seeks the next plan to make, or the changes to make instead. Warnings go to `plan_ctx`.
 fn plan_or_changes<T>(
@@ -164,7 +190,7 @@ fn plan_or_changes<T>(
     };
     Ok(Err(
         match next_plan(plan_ctx, &planning, allowance, &mut setup.former)? {
-            Next::Plan(choice, late) => return Ok(Ok((*choice, late))),
+            Next::Plan(choice, foresight, late) => return Ok(Ok((*choice, *foresight, late))),
             Next::Changes(changes, late) => Found {
                 changes,
                 late,
@@ -259,7 +285,7 @@ fn divide(
 pub(super) enum Next {
     /// Make the kit of this plan, the strongest of those with about the least cost. A lack of time may have
     /// ruled out a step that would make it stronger.
-    Plan(Box<Chosen>, Option<Step>),
+    Plan(Box<Chosen>, Box<Foresight>, Option<Step>),
     /// Make nothing yet: change the trial first.
     Changes(Vec<Change>, Option<Step>),
     /// There is no plan, for this reason.
@@ -327,7 +353,7 @@ pub(super) fn next_plan(
         let may_be_cut = !planning.input.params.key.is_cut();
         key::warn_of_conditions(ctx, surface, (plan.key(), slide), largest_mm, may_be_cut);
     }
-    Ok(Next::Plan(Box::new(best), late))
+    Ok(Next::Plan(Box::new(best), Box::new(foresight), late))
 }
 
 /// Searches for the cheapest plans, or for the reason why there is none. Most plans are changed before one is

@@ -1,5 +1,6 @@
 //! One kit: the finished pieces of a plan, and their verification.
 
+use shellock_assembly::motion::Contact;
 use shellock_geom::{Solid, TriMesh};
 
 use super::agenda::Grade;
@@ -11,7 +12,7 @@ use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
 use crate::piece::{FinishParams, FinishedJoint, PressFit};
 use crate::plan::lesson::{self, Lesson};
-use crate::plan::{Handover, PlanProof};
+use crate::plan::{Handover, LatticePlan, PlanProof};
 use crate::play::{KitPlay, Rattle};
 use crate::verify::{self, Assembly, Finding, Verification};
 use crate::{ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning};
@@ -145,32 +146,40 @@ pub(super) struct Recipe<'a> {
     pub choice: Chosen,
 }
 
-/// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning.
-pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError> {
+/// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning. `change` sees
+/// the plan and the places where its connectors touch; what it returns is returned in place of a kit, and no
+/// pieces are finished.
+pub(super) fn make<T>(
+    ctx: Ctx<'_>,
+    recipe: Recipe<'_>,
+    change: impl FnOnce(&LatticePlan, &[Contact]) -> Result<Option<T>, DesignError>,
+) -> Result<Result<Kit, T>, DesignError> {
     let Recipe { division, choice, .. } = recipe;
     let (surface, settings) = (&division.surface, &division.settings);
     let (sizes, proof) = (&division.sizes.sizes, choice.search_result.proof());
     let handover = Handover::new(recipe.turn, choice.search_result.plan);
-    let made = shellock_make::make(
-        &ctx,
-        &shellock_make::Recipe {
-            body: &settings.body,
-            finish: FinishParams {
-                connector: &settings.connector,
-                relief: settings.relief(),
-                rim_mm: settings.body.rim_mm,
-                grip: division.grip,
-                label: recipe.params.label,
-                turn: *handover.turn(),
-            },
-            surface,
-            sizes,
-            grid: recipe.grid,
-            distances: recipe.distances,
-            plan: handover.found_plan(),
-            key_slide: settings.plan.key.and(settings.plan.key_slide),
+    let of_pieces = shellock_make::Recipe {
+        body: &settings.body,
+        finish: FinishParams {
+            connector: &settings.connector,
+            relief: settings.relief(),
+            rim_mm: settings.body.rim_mm,
+            grip: division.grip,
+            label: recipe.params.label,
+            turn: *handover.turn(),
         },
-    )?;
+        surface,
+        sizes,
+        grid: recipe.grid,
+        distances: recipe.distances,
+        plan: handover.found_plan(),
+        key_slide: settings.plan.key.and(settings.plan.key_slide),
+    };
+    let parts = shellock_make::make_parts(&ctx, &of_pieces)?;
+    if let Some(changed) = change(handover.found_plan(), &parts.contacts)? {
+        return Ok(Err(changed));
+    }
+    let made = shellock_make::join_parts(&ctx, &of_pieces, parts)?;
     let (finished, plan) = (made.0.hand_over(&handover), handover.plan());
     // The verdict, from the finished meshes alone.
     let judging = ctx.fork();
@@ -184,7 +193,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     let mut warnings = handover.warnings(ctx.into_warnings());
     warnings.extend(judging.into_warnings());
     warnings.extend(judged.warnings());
-    Ok(Kit {
+    Ok(Ok(Kit {
         surface: handover.surface(surface),
         sizes: handover.sizes(sizes),
         plan,
@@ -202,5 +211,5 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         rattles: judged.rattles,
         warnings,
         handover,
-    })
+    }))
 }

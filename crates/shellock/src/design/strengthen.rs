@@ -125,8 +125,6 @@ fn join(
 
 #[cfg(test)]
 mod tests {
-    use shellock_geom::Vec3;
-
     use super::super::agenda::Agenda;
     use super::super::tests::Ball;
     use super::*;
@@ -135,7 +133,7 @@ mod tests {
     use crate::design::candidate::Candidate;
     use crate::handling::{Deed, Failure};
     use crate::metric::{EvenSurface, GivesWay, RESERVE};
-    use crate::plan::{LatticePlan, PlanConstraints, PlanScore, RankedPlan, survey};
+    use crate::plan::{LatticePlan, PlanConstraints, PlanScore, PlanSurvey, RankedPlan, survey};
     use crate::strength::Cavity;
 
     const N: usize = 4;
@@ -155,11 +153,11 @@ mod tests {
         }
     }
 
-    /// Pieces that leave upwards, as they are numbered.
-    fn plan() -> RankedPlan {
-        let up = LatticeDirection::nearest(Vec3::Z);
+    /// Pieces of a ball that leave outwards, as they are numbered.
+    fn plan(survey: &PlanSurvey) -> RankedPlan {
+        let out = |piece: PatchId| (piece, LatticeDirection::nearest(survey.mean_normal[piece]));
         RankedPlan {
-            plan: LatticePlan::new((0..N).map(|p| (PatchId::from(p), up))),
+            plan: LatticePlan::new((0..N).map(|p| out(PatchId::from(p)))),
             score: PlanScore {
                 worst: 1.0,
                 mean: 1.0,
@@ -192,7 +190,7 @@ mod tests {
         };
         let allowance = Agenda::new(&ctx, &ball.input()).allowance(&ctx).only(steps);
         let stand = Stand {
-            plan: &plan(),
+            plan: &plan(&survey),
             bears: vec![press(borne)],
             is_early,
         };

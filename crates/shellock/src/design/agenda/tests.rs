@@ -59,6 +59,17 @@ fn kit_that_rattles() -> Report {
     with_offers(kit(0, 1.5), &[Step::JoinRattling])
 }
 
+/// Kit that is given up since its connectors leave too much play, if that is allowed; else it is finished.
+fn stopped(allowance: &Allowance) -> Report {
+    if !allowance.may_stop_kit {
+        return kit_that_rattles();
+    }
+    Report {
+        is_stopped: true,
+        ..with_offers(Report::default(), &[Step::JoinRattling])
+    }
+}
+
 /// Kit that fails since a piece rattles far too much.
 fn rattling_too_much() -> Report {
     with_offers(kit(1, 3.0), &[Step::JoinRattling])
@@ -121,6 +132,7 @@ impl Story {
 
     fn words(&self, agenda: &Agenda, report: &Report) -> String {
         let result = match report.kit {
+            None if report.is_stopped => "kit given up",
             None if report.offers.is_empty() => "error",
             None if report.offers == [Step::Divide] => "no plan",
             None => "change",
@@ -177,6 +189,10 @@ fn stories() -> Vec<Story> {
                 true => with_offers(Report::default(), &[Step::JoinPredicted]),
                 false => kit(0, 0.0),
             },
+        ),
+        Story::new(
+            "every kit rattles and is given up where that is allowed",
+            |_, _, allowance| stopped(allowance),
         ),
         labels(Story::new(
             "labels are given and every kit comes loose",
@@ -365,4 +381,24 @@ fn a_change_before_a_kit_is_made_though_the_time_ends_and_then_no_more_are_allow
     let late = agenda.allowance(&ctx);
     assert!(!late.is_allowed(Step::Enlarge) && !late.is_allowed(Step::JoinPredicted));
     assert!(!agenda.is_cut_short(), "nothing was left out so far");
+}
+
+#[test]
+fn a_kit_is_given_up_only_if_another_one_may_follow() {
+    let (rounds, ways) = (Rounds::default(), four_ways());
+    let agenda = || Agenda::with(Clock::of_time(f64::INFINITY), ways.clone(), rounds, Vec::new());
+    let ctx = Ctx::quiet();
+    let mut open = agenda();
+    open.set_keys(4);
+    // Two kits are allowed with the first key of the first way.
+    for may_stop in [true, false] {
+        let allowance = open.allowance(&ctx);
+        assert_eq!(allowance.may_stop_kit, may_stop);
+        open.next(&ctx, &stopped(&allowance));
+    }
+    assert!(open.has_stopped_kits());
+    assert!(!agenda().without_stops().allowance(&ctx).may_stop_kit);
+    let forbidden = vec![Step::JoinRattling];
+    let mut labelled = Agenda::with(Clock::of_time(f64::INFINITY), ways.clone(), rounds, forbidden);
+    assert!(!labelled.allowance(&ctx).may_stop_kit);
 }

@@ -1,0 +1,70 @@
+//! Folds of a surface: faces that have material right in front of them.
+//!
+//! A closed, oriented surface can still fold back on itself by some micrometres, where rounding moved a point
+//! across a face. No count of edges sees that, but a ray does: in front of a sound face it leaves through the
+//! air, so the first face that it meets shows its outer side.
+
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{TriMesh, Vec3};
+
+/// Area up to which faces are not judged, mm²: no slicer shows what happens in a square of 0.1 mm.
+const LEAST_MM2: f64 = 0.01;
+/// Distance from a face at which there must be air, mm.
+const IN_FRONT_MM: f64 = 2e-3;
+/// Directions of the rays, turned to the side that the face looks at. All of them must meet material: one ray
+/// may pass through an edge.
+const DIRECTIONS: [Vec3; 3] = [
+    Vec3::new(0.31, 0.62, 0.72),
+    Vec3::new(-0.77, 0.21, 0.6),
+    Vec3::new(0.2, -0.86, 0.47),
+];
+
+/// Returns the faces of a closed mesh that have material 2 µm in front of their middle, in order. Faces of
+/// 0.01 mm² and less are left out.
+pub fn faces_turned_inwards(mesh: &TriMesh) -> Vec<usize> {
+    let bvh = TriangleBvh::new(mesh);
+    let is_in_material = |face: usize| {
+        let normal = mesh.face_normal(face);
+        let [a, b, c] = mesh.corners(face);
+        let origin = (a + b + c) / 3.0 + IN_FRONT_MM * normal;
+        DIRECTIONS.into_iter().all(|along| {
+            let along = along.normalize() * along.dot(normal).signum();
+            let first = bvh.first_hit(origin, along, f64::INFINITY);
+            first.is_some_and(|(hit, _)| mesh.double_area_vector(hit as usize).dot(along) > 0.0)
+        })
+    };
+    (0..mesh.triangles.len())
+        .filter(|&face| mesh.double_area_vector(face).length() > 2.0 * LEAST_MM2 && is_in_material(face))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_testkit::shapes::cuboid;
+
+    use super::*;
+
+    #[test]
+    fn a_fold_is_found_where_a_flap_lies_just_below_the_surface() {
+        let hollow = cuboid([0.0; 3], [9.0; 3]).subtract(&cuboid([2.0; 3], [7.0; 3]));
+        let mut mesh = hollow.to_mesh();
+        assert_eq!(faces_turned_inwards(&mesh), []);
+        // The middle of the top is pulled through the wall below it: the surface runs back beneath itself.
+        let top: Vec<usize> = (0..mesh.triangles.len())
+            .filter(|&face| mesh.corners(face).iter().all(|p| p.z == 9.0))
+            .collect();
+        let [a, b, c] = mesh.triangles[top[0]];
+        let middle = mesh.points.len() as u32;
+        let [p, q, r] = mesh.corners(top[0]);
+        mesh.points.push((p + q + r) / 3.0 - 4.0 * Vec3::Z);
+        mesh.triangles[top[0]] = [a, b, middle];
+        mesh.triangles.extend([[b, c, middle], [c, a, middle]]);
+        assert!(!faces_turned_inwards(&mesh).is_empty());
+        // A needle of a fold is too small to count.
+        let tiny = TriMesh {
+            points: mesh.points.iter().map(|p| 1e-3 * *p).collect(),
+            ..mesh
+        };
+        assert_eq!(faces_turned_inwards(&tiny), []);
+    }
+}

@@ -1,0 +1,103 @@
+//! Places where the halves of a run touch each other, a clearance apart.
+
+use shellock_assembly::motion::Contact;
+use shellock_geom::Vec3;
+
+use super::ConnectorParams;
+use super::profile::Section;
+use super::station::{Run, RunShape, RunStation};
+
+/// Contacts of the male half with the female one at all stations of a run
+/// and between them: below the tip of the pin and on
+/// both of its sides, or on three sides of a rail's tongue.
+pub(crate) fn contacts(params: &ConnectorParams, run: &Run) -> Vec<Contact> {
+    let between = |w: &[RunStation]| {
+        let middle = |a: Vec3, b: Vec3| a.midpoint(b);
+        RunStation {
+            point: middle(w[0].point, w[1].point),
+            tangent: middle(w[0].tangent, w[1].tangent).normalize_or_zero(),
+            n: middle(w[0].n, w[1].n).normalize_or_zero(),
+            ..w[0]
+        }
+    };
+    let middles = run.stations.windows(2).map(between);
+    (run.stations.iter().copied().chain(middles))
+        .flat_map(|station| at_station(params, run, &station))
+        .collect()
+}
+
+fn at_station(params: &ConnectorParams, run: &Run, station: &RunStation) -> Vec<Contact> {
+    let Some(pin) = Section::at(params, station).male[0] else {
+        return Vec::new();
+    };
+    let middle = |from: f64, to: f64| 0.5 * (from + to);
+    let up = station
+        .s
+        .reject_from_normalized(station.tangent)
+        .normalize_or_zero();
+    // Coordinates along n and ŝ, and the direction that the face looks.
+    let faces = match station.shape {
+        RunShape::Seam => vec![
+            ([middle(pin.n0, pin.n1), pin.s0], -up),
+            ([pin.n0, pin.s0], -station.n),
+            ([pin.n0, 0.1 * pin.s0], -station.n),
+            ([pin.n1, pin.s0], station.n),
+            ([pin.n1, 0.1 * pin.s0], station.n),
+        ],
+        RunShape::Rail(_) => vec![
+            ([pin.n1, middle(pin.s0, pin.s1)], station.n),
+            ([0.5 * pin.n1, pin.s1], up),
+            ([0.5 * pin.n1, pin.s0], -up),
+        ],
+    };
+    let contact = |([n, s], normal): ([f64; 2], Vec3)| Contact {
+        a: run.male,
+        b: run.female,
+        point: station.place(n, s),
+        normal,
+        gap_mm: station.clearance_mm,
+        area_mm2: 0.0,
+    };
+    faces.into_iter().map(contact).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_report::PatchId;
+
+    use super::*;
+
+    #[test]
+    fn the_pin_of_a_run_leaves_along_one_direction_only() {
+        let at = |arc_mm: f64| RunStation {
+            point: arc_mm * Vec3::X,
+            tangent: Vec3::X,
+            n: Vec3::Y,
+            s: Vec3::Z,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm,
+            size_mm: 3.0,
+            clearance_mm: 0.12,
+            shape: RunShape::Seam,
+        };
+        let run = Run {
+            male: PatchId(1),
+            female: PatchId(0),
+            stations: vec![at(0.0), at(6.0)],
+        };
+        let found = contacts(&ConnectorParams::default(), &run);
+        assert!(
+            found
+                .iter()
+                .all(|c| (c.a, c.b, c.gap_mm) == (PatchId(1), PatchId(0), 0.12))
+        );
+        let blocks = |way: Vec3| found.iter().any(|c| c.normal.dot(way) > 0.9);
+        assert!(!blocks(Vec3::Z));
+        assert!(blocks(-Vec3::Z) && blocks(Vec3::Y) && blocks(-Vec3::Y));
+        // Both ends and the middle of the run.
+        for x in [0.0, 3.0, 6.0] {
+            assert_eq!(found.iter().filter(|c| c.point.x == x).count(), 5);
+        }
+    }
+}

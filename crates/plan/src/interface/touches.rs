@@ -1,0 +1,197 @@
+//! Places where the pieces of a whole plan would touch each other, before anything is built: walls at the
+//! outside and at the inside, and pins with their channels.
+//!
+//! Unlike the tables of a contact, which know two pieces, these know all pieces: a run also ends where a
+//! third piece would sweep over it, or where one of its own pieces would run into a third.
+
+use shellock_assembly::LatticeDirection;
+use shellock_assembly::motion::Contact;
+use shellock_geom::Vec3;
+use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
+use shellock_report::PatchId;
+
+use super::Interface;
+use super::obstruction::Leave;
+use super::sample::{Kind, Sample, Way};
+use crate::{LatticePlan, PlanParams};
+
+/// Samples from one that touches to the next.
+const STEP: usize = 3;
+/// Depths at which walls touch, as shares of their thickness.
+const DEPTHS: [f64; 2] = [0.1, 0.9];
+
+/// Contacts of the walls of all pieces, with the gaps of walls.
+pub fn wall_contacts(params: &PlanParams, interfaces: &[Interface], plan: &LatticePlan) -> Vec<Contact> {
+    interfaces
+        .iter()
+        .flat_map(|interface| walls(params, interface, plan))
+        .collect()
+}
+
+fn walls(params: &PlanParams, interface: &Interface, plan: &LatticePlan) -> Vec<Contact> {
+    let (side, [later, earlier]) = order(interface, plan);
+    let s = plan.separation(later).unit();
+    let at = |x: &Sample, depth: f64| Contact {
+        a: later,
+        b: earlier,
+        point: x.point + (1.0 - depth) * params.wall_mm * x.normal,
+        normal: x.frame(side).wall(s),
+        gap_mm: match later == plan.key() {
+            true => params.key_gap_mm,
+            false => params.wall_gap_mm,
+        },
+        area_mm2: 0.0,
+    };
+    let samples = interface
+        .lines
+        .iter()
+        .flat_map(|line| line.samples.iter().step_by(STEP));
+    samples.flat_map(|x| DEPTHS.map(|depth| at(x, depth))).collect()
+}
+
+/// Side of a pair as in [`Way`], and its later and its earlier piece.
+fn order(interface: &Interface, plan: &LatticePlan) -> (f64, [PatchId; 2]) {
+    match plan.position(interface.a) > plan.position(interface.b) {
+        true => (1.0, [interface.a, interface.b]),
+        false => (-1.0, [interface.b, interface.a]),
+    }
+}
+
+/// Contacts of all pins of a plan with their channels, each a clearance apart.
+pub fn pin_contacts(params: &PlanParams, interfaces: &[Interface], plan: &LatticePlan) -> Vec<Contact> {
+    let leaves = Leave::all(plan);
+    let of_pair = |interface: &Interface| pins(params, interface, plan, &leaves);
+    interfaces.iter().flat_map(of_pair).collect()
+}
+
+fn pins(params: &PlanParams, interface: &Interface, plan: &LatticePlan, leaves: &[Leave]) -> Vec<Contact> {
+    let (side, [later, earlier]) = order(interface, plan);
+    let (pair, s) = ([interface.a, interface.b], plan.separation(later));
+    let way = Way::new(params, pair, side, s);
+    let is_clear = |x: &Sample| {
+        let sights = x.sights.as_ref();
+        !sights.is_some_and(|sights| sights.is_blocked(pair, later == interface.a, leaves))
+    };
+    let contact = |(of_later, point, normal): (bool, Vec3, Vec3)| Contact {
+        a: if of_later { later } else { earlier },
+        b: if of_later { earlier } else { later },
+        point,
+        normal,
+        gap_mm: params.clearance_mm,
+        area_mm2: 0.0,
+    };
+    let mut found = Vec::new();
+    for line in &interface.lines {
+        let runs = line.runs_where(way, &is_clear);
+        for run in runs.into_iter().filter(|run| run.is_made(interface.size_mm)) {
+            let last = run.samples.len() - 1;
+            let places = (0..=last).filter(|i| i % STEP == 0 || *i == last);
+            let samples = places.map(|i| &line.samples[run.samples[i]]);
+            let faces = samples.flat_map(|x| faces(run.kind, interface.size_mm, x, s, side));
+            found.extend(faces.map(contact));
+        }
+    }
+    found
+}
+
+/// Faces of the male half at a sample: true if it is the later piece's, a point, and the direction that the
+/// face looks.
+fn faces(kind: Kind, size_mm: f64, x: &Sample, s: LatticeDirection, side: f64) -> Vec<(bool, Vec3, Vec3)> {
+    let across = side * x.across;
+    match kind {
+        Kind::Pin { later_is_male } => {
+            let sign = if later_is_male { 1.0 } else { -1.0 };
+            let leaves = (sign * s.unit())
+                .reject_from_normalized(x.tangent)
+                .normalize_or_zero();
+            // The pin lies on its own side of the seam.
+            let to_female = sign * across;
+            let n = to_female.reject_from_normalized(leaves).normalize_or(x.normal);
+            let at = |beside: f64, below: f64| x.point - size_mm * (beside * n + below * leaves);
+            vec![
+                (later_is_male, at(0.5 * PIN_WIDTH, PIN_DEPTH), -leaves),
+                (later_is_male, at(PIN_WIDTH, PIN_DEPTH), -n),
+                (later_is_male, at(PIN_WIDTH, 0.1 * PIN_DEPTH), -n),
+                (later_is_male, at(0.0, PIN_DEPTH), n),
+                (later_is_male, at(0.0, 0.1 * PIN_DEPTH), n),
+            ]
+        }
+        // The earlier piece carries the tongue, which reaches under the later one's wall.
+        Kind::Rail => {
+            let at = |below: f64| x.point - size_mm * (0.25 * across + below * x.normal);
+            vec![
+                (false, at(0.0), x.normal),
+                (false, at(0.45), -x.normal),
+                (false, at(0.2) - 0.25 * size_mm * across, -across),
+            ]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_test_surfaces::{label, seams, sphere};
+
+    use super::*;
+    use crate::LatticeStep;
+    use crate::interface::contacts;
+    use crate::sizes::ConnectorSizes;
+
+    const LID: PatchId = PatchId(2);
+
+    /// Contacts of a ball with two lower quarters and a lid, which leaves first, along `s`: first those of
+    /// walls.
+    fn touches_of_ball(s: Vec3) -> [Vec<Contact>; 2] {
+        let ball = sphere(5, Vec3::splat(40.0));
+        let surface = label(ball, 3, |p| if p.z > 0.0 { 2 } else { u32::from(p.x > 0.0) });
+        let params = PlanParams {
+            wall_mm: 2.0,
+            ..PlanParams::default()
+        };
+        let step = |piece: u32, along: Vec3| LatticeStep {
+            piece: PatchId(piece),
+            separation: LatticeDirection::nearest(along),
+        };
+        let plan = LatticePlan {
+            steps: vec![step(0, Vec3::X), step(1, Vec3::X), step(2, s)],
+        };
+        let found = contacts(&params, &surface, &seams(&surface), &ConnectorSizes::default());
+        [
+            wall_contacts(&params, &found, &plan),
+            pin_contacts(&params, &found, &plan),
+        ]
+    }
+
+    fn is_of_lid(contact: &Contact) -> bool {
+        contact.a == LID || contact.b == LID
+    }
+
+    #[test]
+    fn connectors_that_a_third_piece_would_sweep_over_touch_nothing() {
+        let lower = |s: Vec3| touches_of_ball(s)[1].iter().filter(|c| !is_of_lid(c)).count();
+        // Upwards, the lid passes none of them; downwards, its top would pass through all.
+        assert!(lower(Vec3::Z) > 20);
+        assert_eq!(lower(-Vec3::Z), 0);
+    }
+
+    #[test]
+    fn walls_and_pins_let_their_piece_out_and_hold_it_on_the_way_in() {
+        let [walls, pins] = touches_of_ball(Vec3::Z);
+        assert!(
+            walls
+                .iter()
+                .all(|c| c.gap_mm == if is_of_lid(c) { 0.15 } else { 0.1 })
+        );
+        for of_lid in [walls, pins].map(|touches| {
+            let outwards = |c: &Contact| if c.a == LID { c.normal } else { -c.normal };
+            touches
+                .iter()
+                .filter(|c| is_of_lid(c))
+                .map(outwards)
+                .collect::<Vec<Vec3>>()
+        }) {
+            assert!(of_lid.iter().all(|normal| normal.z < 0.1), "{of_lid:?}");
+            assert!(of_lid.iter().any(|normal| normal.z < -0.9), "{of_lid:?}");
+        }
+    }
+}
