@@ -146,8 +146,8 @@ pub enum Finding {
     Folded {
         /// Piece with these faces.
         piece: PatchId,
-        /// Number of such faces.
-        count: usize,
+        /// Area of such faces, mm².
+        area_mm2: f64,
         /// Middle of the first face.
         at: [f64; 3],
     },

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
-use super::folds::faces_turned_inwards;
+use super::folds::Fold;
+use super::limits::FOLD_MM2;
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -22,6 +23,8 @@ pub struct Body {
     pub volume: Option<Volume>,
     /// Defects found in the mesh.
     defects: Vec<Finding>,
+    /// Faces of the mesh that have material right in front of them; `None` if there are none.
+    fold: Option<Fold>,
 }
 
 /// Summary of the edges of a mesh.
@@ -62,9 +65,12 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
         check("no edge shared by four faces", |f| {
             matches!(f, Finding::SharedEdges { .. })
         }),
-        check("no surface folds back on itself", |f| {
-            matches!(f, Finding::Folded { .. })
-        }),
+        Check {
+            figure: figure_of_folds(bodies),
+            ..check("no surface folds back on itself", |f| {
+                matches!(f, Finding::Folded { .. })
+            })
+        },
         check("every piece one connected body", |f| {
             matches!(f, Finding::SeveralBodies { .. })
         }),
@@ -92,7 +98,6 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     match &volume {
         None => defects.push(Finding::NotClosed { piece }),
         Some(volume) => {
-            defects.extend(fold(piece, &mesh));
             let count = volume
                 .components()
                 .iter()
@@ -103,22 +108,27 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
             }
         }
     }
+    let fold = volume.as_ref().and_then(|_| Fold::of(&mesh));
+    if let Some(fold) = fold.filter(|fold| fold.area_mm2 > FOLD_MM2) {
+        defects.push(Finding::Folded {
+            piece,
+            area_mm2: fold.area_mm2,
+            at: fold.at.to_array(),
+        });
+    }
     Body {
         mesh,
         volume,
         defects,
+        fold,
     }
 }
 
-/// Fold of a closed mesh, if there is one.
-fn fold(piece: PatchId, mesh: &TriMesh) -> Option<Finding> {
-    let folded = faces_turned_inwards(mesh);
-    let [a, b, c] = mesh.corners(*folded.first()?);
-    Some(Finding::Folded {
-        piece,
-        count: folded.len(),
-        at: ((a + b + c) / 3.0).to_array(),
-    })
+/// Faces of all pieces that have material right in front of them, in words.
+fn figure_of_folds(bodies: &IdVec<PatchId, Body>) -> String {
+    let folds = bodies.iter().filter_map(|(_, body)| body.fold);
+    let (n, area_mm2) = folds.fold((0, 0.0), |(n, mm2), fold| (n + fold.n_faces, mm2 + fold.area_mm2));
+    format!("{n} faces, {area_mm2:.2} mm², have material in front")
 }
 
 /// Returns `mesh`, unless it refers to points that do not exist, or has coordinates that are not finite.

@@ -19,9 +19,36 @@ const DIRECTIONS: [Vec3; 3] = [
     Vec3::new(0.2, -0.86, 0.47),
 ];
 
+/// Faces of a mesh that have material right in front of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fold {
+    /// Number of the faces, one at least.
+    pub n_faces: usize,
+    /// Area of the faces, mm².
+    pub area_mm2: f64,
+    /// Middle of the first face.
+    pub at: Vec3,
+}
+
+impl Fold {
+    /// Finds the faces of a closed mesh that have material right in front of them; `None` if there are none.
+    pub fn of(mesh: &TriMesh) -> Option<Self> {
+        let faces = faces_turned_inwards(mesh);
+        let [a, b, c] = mesh.corners(*faces.first()?);
+        Some(Self {
+            n_faces: faces.len(),
+            area_mm2: faces
+                .iter()
+                .map(|&face| 0.5 * mesh.double_area_vector(face).length())
+                .sum(),
+            at: (a + b + c) / 3.0,
+        })
+    }
+}
+
 /// Returns the faces of a closed mesh that have material 2 µm in front of their middle, in order. Faces of
 /// 0.01 mm² and less are left out.
-pub fn faces_turned_inwards(mesh: &TriMesh) -> Vec<usize> {
+fn faces_turned_inwards(mesh: &TriMesh) -> Vec<usize> {
     let bvh = TriangleBvh::new(mesh);
     let is_in_material = |face: usize| {
         let normal = mesh.face_normal(face);

@@ -10,10 +10,12 @@
 //! | widest gap in the skin, to either side | 0.5 mm | 0.45 mm | primer fills a scratch; a hole shows |
 //! | overlap on a way out | 0.5 mm³, 0.03 mm thick | a tenth less | thinner than the clearance: it rubs off |
 //! | overlap with what stops a push | 0.5 mm³ | a tenth more | less shears off or slips past |
+//! | surface of a piece that folds back on itself | 0 | 0.5 mm² | a slit of 2 µm does no harm (5) |
 //! | length of a push ([`crate::push`]) | 3 clearances + 0.6 mm | equal | more than all play (4) |
 //!
 //! (1) Joints cut without any gap share 0.07 mm³ by rounding alone. (2) Measured by rays here. (3) Four sigma
-//! of the samples above the outside limit. (4) And more than the roundness of printed edges.
+//! of the samples above the outside limit. (4) And more than the roundness of printed
+//! edges. (5) Here alone the outside judge is stricter, if it is asked to be (`--strict`).
 
 /// Greatest common volume of two pieces that counts as rounding, mm³.
 pub const OVERLAP_MM3: f64 = 0.5;
@@ -29,6 +31,8 @@ pub const RUB_MM3: f64 = 0.45;
 pub const RUB_MM: f64 = 0.027;
 /// Least overlap with others that holds a pushed piece, mm³.
 pub const HOLD_MM3: f64 = 0.55;
+/// Greatest area of a piece's surface that may have material right in front of it, mm².
+pub const FOLD_MM2: f64 = 0.5;
 /// Width below which slots within one piece are reported, mm: resin fuses them, and no nozzle leaves them
 /// open.
 pub const LEAST_SLOT_MM: f64 = 0.2;

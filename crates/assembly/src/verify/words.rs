@@ -43,8 +43,8 @@ impl Finding {
                 "{count} edges of piece {piece} have more than two triangles, first {}",
                 words.place(*at)
             ),
-            Self::Folded { piece, count, at } => format!(
-                "the surface of piece {piece} folds back on itself: {count} faces have material right in \
+            Self::Folded { piece, area_mm2, at } => format!(
+                "the surface of piece {piece} folds back on itself: {area_mm2:.1} mm² have material right in \
                  front of them, first {}; another number of pieces avoids it",
                 words.place(*at)
             ),

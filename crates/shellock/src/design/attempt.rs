@@ -99,7 +99,7 @@ pub(super) fn make_kit(
             ctx,
             &division.settings.segmentation,
             &division.surface,
-            &rattling,
+            loosest_half(&rattling),
         )?)
     };
     let found = match make(kit_ctx, recipe, join_rattlers) {
@@ -321,7 +321,7 @@ pub(super) fn next_plan(
     {
         late = allowance.late(Step::JoinPredicted);
         if late.is_none()
-            && let Some(fewer) = join(ctx, &settings.segmentation, surface, &rattling)?
+            && let Some(fewer) = join(ctx, &settings.segmentation, surface, loosest_half(&rattling))?
         {
             let change = Change::Divide(Step::JoinPredicted, fewer, None);
             return Ok(Next::Changes(vec![change], None));
@@ -354,6 +354,12 @@ pub(super) fn next_plan(
         key::warn_of_conditions(ctx, surface, (plan.key(), slide), largest_mm, may_be_cut);
     }
     Ok(Next::Plan(Box::new(best), Box::new(foresight), late))
+}
+
+/// The pieces to join first of those that would rattle, which come loosest first. Each that is joined holds
+/// its neighbours better, too, so the others may need no joining.
+fn loosest_half(rattling: &[PatchId]) -> &[PatchId] {
+    &rattling[..rattling.len().div_ceil(2)]
 }
 
 /// Searches for the cheapest plans, or for the reason why there is none. Most plans are changed before one is
