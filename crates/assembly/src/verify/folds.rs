@@ -72,26 +72,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fold_is_found_where_a_flap_lies_just_below_the_surface() {
-        let hollow = cuboid([0.0; 3], [9.0; 3]).subtract(&cuboid([2.0; 3], [7.0; 3]));
-        let mut mesh = hollow.to_mesh();
-        assert_eq!(faces_turned_inwards(&mesh), []);
-        // The middle of the top is pulled through the wall below it: the surface runs back beneath itself.
-        let top: Vec<usize> = (0..mesh.triangles.len())
-            .filter(|&face| mesh.corners(face).iter().all(|p| p.z == 9.0))
-            .collect();
-        let [a, b, c] = mesh.triangles[top[0]];
-        let middle = mesh.points.len() as u32;
-        let [p, q, r] = mesh.corners(top[0]);
-        mesh.points.push((p + q + r) / 3.0 - 4.0 * Vec3::Z);
-        mesh.triangles[top[0]] = [a, b, middle];
-        mesh.triangles.extend([[b, c, middle], [c, a, middle]]);
-        assert!(!faces_turned_inwards(&mesh).is_empty());
-        // A needle of a fold is too small to count.
-        let tiny = TriMesh {
-            points: mesh.points.iter().map(|p| 1e-3 * *p).collect(),
-            ..mesh
-        };
-        assert_eq!(faces_turned_inwards(&tiny), []);
+    fn faces_inside_other_material_are_a_fold_and_those_of_a_cavity_are_none() {
+        let outer = cuboid([0.0; 3], [10.0; 3]);
+        let inner = cuboid([2.0; 3], [8.0; 3]);
+        assert_eq!(Fold::of(&outer.subtract(&inner).to_mesh()), None);
+        // Both surfaces at once, not united: the inner one lies within the material of the outer one.
+        let (mut both, inner) = (outer.to_mesh(), inner.to_mesh());
+        let first = both.points.len() as u32;
+        both.points.extend(&inner.points);
+        both.triangles
+            .extend(inner.triangles.iter().map(|t| t.map(|v| v + first)));
+        let fold = Fold::of(&both).expect("the inner faces have material in front");
+        assert_eq!(fold.n_faces, inner.triangles.len());
+        assert!((fold.area_mm2 - inner.area()).abs() < 1e-9);
+        assert!((fold.at - Vec3::splat(5.0)).abs().max_element() > 2.9);
+        // Faces of less than 0.01 mm² are not judged.
+        let points = both.points.iter().map(|p| 1e-2 * *p).collect();
+        assert_eq!(Fold::of(&TriMesh { points, ..both }), None);
     }
 }
