@@ -71,8 +71,9 @@ pub fn design(
     let grade = |kit: &Kit| (kit.grade(), kit.failures());
     let agenda = Agenda::new(ctx, &input);
     let (mut best, mut agenda, mut effort) = run(ctx, input, agenda, attempt::make_kit, grade)?;
-    if agenda.has_stopped_kits() && !best.has_end() {
-        // Fewer pieces have no kit, so one that rattles is better than none.
+    if agenda.has_stopped_kits() && !best.has_end() && !agenda.is_cut_short() {
+        // Fewer pieces have no kit, so one that rattles is better than none. Without time it would not be
+        // made either, and the reasons of the first run would be lost.
         ctx.note("no kit has less play: now one that rattles");
         let before = effort;
         agenda = Agenda::new(ctx, &input).without_stops();

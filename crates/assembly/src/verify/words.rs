@@ -45,7 +45,7 @@ impl Finding {
             ),
             Self::Folded { piece, area_mm2, at } => format!(
                 "the surface of piece {piece} folds back on itself: {area_mm2:.1} mm² have material right in \
-                 front of them, first {}; another number of pieces avoids it",
+                 front of them, first {}; another number of pieces may avoid it",
                 words.place(*at)
             ),
             Self::SeveralBodies { piece, count } => format!("piece {piece} falls into {count} bodies"),

@@ -7,9 +7,8 @@ use super::ConnectorParams;
 use super::profile::Section;
 use super::station::{Run, RunShape, RunStation};
 
-/// Contacts of the male half with the female one at all stations of a run
-/// and between them: below the tip of the pin and on
-/// both of its sides, or on three sides of a rail's tongue.
+/// Contacts of the male half with the female one at all stations of a run and between them: below the tip of
+/// the pin and on both of its sides, or on three sides of a rail's tongue.
 pub(crate) fn contacts(params: &ConnectorParams, run: &Run) -> Vec<Contact> {
     let between = |w: &[RunStation]| {
         let middle = |a: Vec3, b: Vec3| a.midpoint(b);
