@@ -16,6 +16,7 @@ mod body;
 mod columns;
 mod cover;
 mod folds;
+mod hanging;
 #[cfg(test)]
 pub(crate) mod kits;
 mod overlap;
@@ -158,6 +159,17 @@ pub enum Finding {
         /// Number of bodies, crumbs not counted.
         count: usize,
     },
+    /// A part of a piece hangs on the rest by a bridge so thin that it breaks.
+    Hanging {
+        /// Piece with this part.
+        piece: PatchId,
+        /// Volume of the part without its outermost layer, mm³.
+        volume_mm3: f64,
+        /// Width below which the bridge is, mm.
+        width_mm: f64,
+        /// Middle of the part.
+        at: [f64; 3],
+    },
     /// Two pieces overlap in the assembly.
     Overlap {
         /// Piece with the lower id.
@@ -234,6 +246,7 @@ impl Finding {
         match self {
             Self::SharedEdges { at, .. }
             | Self::Folded { at, .. }
+            | Self::Hanging { at, .. }
             | Self::Overlap { at, .. }
             | Self::PathRubs { at, .. }
             | Self::PlayTooWide { at, .. }

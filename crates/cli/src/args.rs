@@ -221,11 +221,12 @@ const EXAMPLES: [(&str, &str); 8] = [
 ];
 
 /// Options of `build` that dividing alone does not use.
-const NOT_TO_DIVIDE: [&str; 22] = [
+const NOT_TO_DIVIDE: [&str; 23] = [
     "key",
     "time",
     "plan-time",
     "thickness",
+    "wall",
     "material",
     "drop",
     "connector",

@@ -9,7 +9,7 @@ use shellock_job::input::Model;
 use shellock_job::output::{Destination, Summary};
 use shellock_job::place::Standing;
 use shellock_job::printing::Printing;
-use shellock_job::told::{bearing, fits, list_effort, quality, weakest};
+use shellock_job::told::{bearing, fits, list_effort, quality, wall_kinds, wall_words, weakest};
 
 use crate::Session;
 use crate::progress::Shown;
@@ -66,6 +66,9 @@ impl Finished<'_> {
 
     fn print_figures(&self, session: &Session) {
         let (made, standing) = (self.design, self.upright);
+        if let Some(words) = wall_words(&wall_kinds(made, self.summary.grams)) {
+            println!("walls: {words} (--wall)");
+        }
         bears_lines(&made.kit.holding, standing)
             .into_iter()
             .for_each(|line| println!("{line}"));

@@ -7,5 +7,7 @@
 mod causes;
 pub mod key;
 pub mod segmentation;
+mod widen;
 
 pub use causes::Cause;
+pub use widen::{WithKey, least_width_mm, widen};

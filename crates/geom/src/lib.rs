@@ -17,6 +17,7 @@ pub mod level_cut;
 mod loft;
 pub mod marching_cubes;
 pub mod mesh;
+pub mod opening;
 pub mod polygon;
 pub mod remesh;
 pub mod repair;

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 pub use choices::{Choice, Choices, Offer, apply_changes, offers, relabel};
 pub use pieces::{Key, Pieces};
 use shellock::connector::ConnectorParams;
-use shellock::design::{self, KeySource, Params};
+use shellock::design::{self, KeySource, Params, WallChoice};
 use shellock::segmentation::{KeepWhole, Method};
 use shellock::sizes::{SizeChoice, SizeRange};
 use shellock_mechanics::Material;
@@ -84,6 +84,8 @@ pub struct Options {
     pub plan_time: f64,
     /// Thickness of the walls.
     pub thickness: Thickness,
+    /// Kind of the walls, if their thickness is ours to choose.
+    pub wall: WallChoice,
     /// Material that the kit is printed of; the printer's own if `None`.
     pub material: Option<Material>,
     /// Height of the fall that walls must bear, m.
@@ -150,6 +152,7 @@ impl Default for Options {
             effort: None,
             plan_time: 10.0,
             thickness: Thickness::Auto,
+            wall: WallChoice::default(),
             material: None,
             drop: params.drop_m,
             connector: SizeChoice::Auto(SizeRange::default()),
@@ -202,6 +205,7 @@ impl Options {
             Thickness::Auto => design::Thickness::Auto,
             Thickness::Mm(mm) => design::Thickness::Mm(mm),
         };
+        p.wall = self.wall;
         p.material = self.material.unwrap_or(printer.material);
         p.drop_m = self.drop;
         p.seam_gap_mm = self.seam_gap.unwrap_or(printer.tolerance_mm);

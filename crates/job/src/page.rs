@@ -22,7 +22,7 @@ use crate::place::Standing;
 use crate::printing::Printing;
 use crate::summary::{Summary, connector_sizes};
 use crate::tabs;
-use crate::told::{bearing, scope};
+use crate::told::{bearing, scope, wall_kinds, wall_words};
 use crate::upright::turn_upright;
 
 /// Builds the page, the picture, and the booklet if it is wanted. All show the model upright: `up` becomes z.
@@ -247,6 +247,8 @@ fn kit_facts(
             ),
         ),
     ];
+    let kinds = wall_words(&wall_kinds(design, summary.grams));
+    facts.extend(kinds.map(|words| ("kinds of wall".into(), words)));
     facts.extend(
         design
             .strength

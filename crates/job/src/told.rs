@@ -1,11 +1,13 @@
 //! Sentences on a finished kit for people.
 
-use shellock::design::{Design, Effort, Settings};
+use serde::Serialize;
+use shellock::design::{Design, Effort, Settings, WallChoice};
 use shellock::metric::Holding;
 use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
 
+use crate::options::Word;
 use crate::place::Standing;
 
 /// Lists what was tried, in order.
@@ -18,6 +20,59 @@ pub fn list_effort(effort: &Effort) -> String {
         text += &format!("\n  {}. {step}", i + 1);
     }
     text
+}
+
+/// A kind of wall, with the mass that the kit has with it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WallKind {
+    /// Word of the option `wall`.
+    pub kind: &'static str,
+    /// Thickness of the wall, mm.
+    pub mm: f64,
+    /// Mass of the pieces without supports, g. With another wall than the kit's it is estimated from the same
+    /// pieces.
+    pub grams: f64,
+    /// True for the wall of the kit.
+    pub is_own: bool,
+}
+
+/// Lists the three kinds of wall for a kit of `grams`; none if the user gave the thickness. A wall that was
+/// made thicker for the sake of use is the least sturdy one, too.
+pub fn wall_kinds(design: &Design, grams: f64) -> Vec<WallKind> {
+    let (Some(walls), Some(strength)) = (design.walls, design.strength.as_ref()) else {
+        return Vec::new();
+    };
+    let own_mm = design.kit.thickness_mm;
+    let g_per_mm = strength.hollow_mm2() * design.settings.strength.material.density_g_cm3 / 1000.0;
+    let kind = |(wall, kind, _): (WallChoice, &'static str, &str)| {
+        let mm = match wall {
+            WallChoice::Light => walls.light_mm.min(own_mm),
+            WallChoice::Standard => walls.standard_mm,
+            WallChoice::Sturdy => walls.sturdy_mm.max(own_mm),
+        };
+        let is_own = wall == walls.wanted;
+        let mm = if is_own { own_mm } else { mm };
+        WallKind {
+            kind,
+            mm,
+            grams: grams + g_per_mm * (mm - own_mm),
+            is_own,
+        }
+    };
+    WallChoice::all().into_iter().map(kind).collect()
+}
+
+/// Describes the kinds of wall in one line for people.
+pub fn wall_words(kinds: &[WallKind]) -> Option<String> {
+    let words = kinds.iter().map(|wall| {
+        let WallKind { kind, mm, grams, .. } = wall;
+        match wall.is_own {
+            true => format!("{kind} {mm:.1} mm, {grams:.0} g (this kit)"),
+            false => format!("{kind} {mm:.1} mm, about {grams:.0} g"),
+        }
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join("; "))
 }
 
 /// Describes the wall's stress in a fall.

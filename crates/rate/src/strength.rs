@@ -289,6 +289,11 @@ impl Strength {
             / self.mesh.area()
     }
 
+    /// Area of the surface with a cavity below, mm².
+    pub fn hollow_mm2(&self) -> f64 {
+        (1.0 - self.solid_share()) * self.mesh.area()
+    }
+
     /// Warnings for the user: a wall that is too weak, and regions where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
         let weak = self.is_too_weak.then(|| {

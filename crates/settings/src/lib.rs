@@ -6,5 +6,5 @@
 mod params;
 mod stages;
 
-pub use params::{KeySource, Params, Rounds, Thickness};
+pub use params::{KeySource, Params, Rounds, Thickness, WallChoice};
 pub use stages::Settings;

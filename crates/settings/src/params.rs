@@ -32,6 +32,8 @@ pub struct Params {
     pub up: [f64; 3],
     /// Choice of the wall thickness; 2 mm.
     pub thickness: Thickness,
+    /// Choice of the wall where the thickness is [`Thickness::Auto`]; standard.
+    pub wall: WallChoice,
     /// Material of the printed pieces.
     pub material: Material,
     /// Height of the fall that the wall must withstand, m. [0.01, 20]; 1.275.
@@ -71,6 +73,7 @@ impl Default for Params {
             symmetric: false,
             up: [0.0, 0.0, 1.0],
             thickness: Thickness::default(),
+            wall: WallChoice::default(),
             material: Material::default(),
             drop_m: 1.275,
             key: KeySource::default(),
@@ -101,6 +104,20 @@ impl Default for Thickness {
     fn default() -> Self {
         Self::Mm(2.0)
     }
+}
+
+/// Choice of the wall, if its thickness is not given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WallChoice {
+    /// As thin as seams allow, whatever it withstands.
+    Light,
+    /// The thinnest wall that survives a fall. It is thicker only if the kit would otherwise not withstand
+    /// what people do with it by hand.
+    #[default]
+    Standard,
+    /// At least half as thick again as a light wall, and so thick that the kit withstands
+    /// [`RESERVE`](shellock_rate::metric::RESERVE) times what people do with it by hand.
+    Sturdy,
 }
 
 /// Choice of the key, the piece installed last.

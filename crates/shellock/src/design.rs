@@ -41,9 +41,10 @@ pub use outcome::{Design, DesignError, DesignOutcome, NoPlan};
 pub use outlook::{Outlook, Verdict, first_division, outlook};
 pub use shellock_assembly::PrintedFit;
 use shellock_geom::Solid;
-pub use shellock_settings::{KeySource, Params, Rounds, Settings, Thickness};
+pub use shellock_settings::{KeySource, Params, Rounds, Settings, Thickness, WallChoice};
 use trial::{Change, Parts, Trial};
 use wall::Wall;
+pub use wall::WallChoices;
 use ways::Input;
 
 use crate::key::Turn;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
 use super::folds::Fold;
+use super::hanging::largest_part;
 use super::limits::FOLD_MM2;
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
@@ -74,6 +75,9 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
         check("every piece one connected body", |f| {
             matches!(f, Finding::SeveralBodies { .. })
         }),
+        check("no part hangs on a thin neck", |f| {
+            matches!(f, Finding::Hanging { .. })
+        }),
     ];
     (checks, findings)
 }
@@ -115,6 +119,9 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
             area_mm2: fold.area_mm2,
             at: fold.at.to_array(),
         });
+    }
+    if volume.is_some() {
+        defects.extend(largest_part(piece, &mesh));
     }
     Body {
         mesh,

@@ -11,11 +11,14 @@
 //! | overlap on a way out | 0.5 mm³, 0.03 mm thick | a tenth less | thinner than the clearance: it rubs off |
 //! | overlap with what stops a push | 0.5 mm³ | a tenth more | less shears off or slips past |
 //! | surface of a piece that folds back on itself | 0 | 0.5 mm² | a slit of 2 µm does no harm (5) |
+//! | part that hangs on a neck of 0.8 mm | 5 mm³ inside | 4.5 mm³, 0.85 mm | a lug of 2 mm breaks off |
+//! | part that hangs on a neck of 1.2 mm | | 10 mm³, 1.25 mm | so does a larger one (6) |
 //! | length of a push ([`crate::push`]) | 3 clearances + 0.6 mm | equal | more than all play (4) |
 //!
 //! (1) Joints cut without any gap share 0.07 mm³ by rounding alone. (2) Measured by rays here. (3) Four sigma
 //! of the samples above the outside limit. (4) And more than the roundness of printed
 //! edges. (5) Here alone the outside judge is stricter, if it is asked to be (`--strict`).
+//! (6) Three lines of a nozzle, and less than any wall that is printed by default.
 
 /// Greatest common volume of two pieces that counts as rounding, mm³.
 pub const OVERLAP_MM3: f64 = 0.5;
@@ -33,6 +36,11 @@ pub const RUB_MM: f64 = 0.027;
 pub const HOLD_MM3: f64 = 0.55;
 /// Greatest area of a piece's surface that may have material right in front of it, mm².
 pub const FOLD_MM2: f64 = 0.5;
+/// Necks that break: their width, mm, and the greatest volume that may hang on them, without its outermost
+/// layer, mm³. What hangs on a thinner neck may itself be too thin to be seen with the greater width.
+pub const NECKS: [(f64, f64); 2] = [(0.85, 4.5), (1.25, 10.0)];
+/// Greatest such width as a share of the mean wall of a piece, for thin walls.
+pub const NECK_WALLS: f64 = 0.8;
 /// Width below which slots within one piece are reported, mm: resin fuses them, and no nozzle leaves them
 /// open.
 pub const LEAST_SLOT_MM: f64 = 0.2;

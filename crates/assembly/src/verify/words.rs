@@ -49,6 +49,13 @@ impl Finding {
                 words.place(*at)
             ),
             Self::SeveralBodies { piece, count } => format!("piece {piece} falls into {count} bodies"),
+            Self::Hanging {
+                piece, width_mm, at, ..
+            } => format!(
+                "a part of piece {piece} hangs on a neck thinner than {width_mm:.1} mm and may break off, \
+                 {}; another number of pieces may avoid it",
+                words.place(*at)
+            ),
             Self::Overlap { a, b, volume_mm3, at } => format!(
                 "pieces {a} and {b} overlap by {volume_mm3:.2} mm³ {}",
                 words.place(*at)

@@ -12,6 +12,7 @@ use shellock_job::output::Destination;
 use shellock_job::place::Standing;
 use shellock_job::shape::shape_warnings;
 use shellock_job::stopwatch::StageTime;
+use shellock_job::told::wall_kinds;
 use shellock_job::work;
 use shellock_job::{Failure, Options};
 
@@ -114,6 +115,7 @@ fn print_json(to: &Destination, made: &Made, stages: &[StageTime], code: u8) {
         "out": to.folder(), "notes": made.notes,
         "pieces": kit.pieces.len(), "key_piece": kit.plan.key(),
         "volume_ratio": summary.volume_ratio, "grams": summary.grams,
+        "walls": wall_kinds(&made.design, summary.grams),
         "print": made.printing.entry().time, "fits_within_mm": made.design.fit.within_mm,
         "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": kit.thickness_mm,

@@ -1,5 +1,7 @@
 //! Imprint of a key: makes the surface inside a prism a patch of its own.
 
+use std::borrow::Cow;
+
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::topology::components;
@@ -9,6 +11,7 @@ use shellock_surface::SegmentedSurface;
 
 use super::KeyPrism;
 use crate::segmentation::{SegmentationError, SegmentationParams, refined_again};
+use crate::widen::widen;
 
 /// Greatest edge length near the new seam, mm: corners are round to within a tenth of a millimetre.
 const EDGE_MM: f64 = 1.2;
@@ -58,7 +61,8 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
 }
 
 /// Returns the surface with the part in `prism` as a patch, and the id of that patch, as [`imprint`] does. If
-/// the key leaves a piece hanging on another, the pieces are refined first.
+/// the key leaves a piece hanging on another, the pieces are refined first; if it leaves a piece narrow, a
+/// part of that piece goes to a neighbour ([`widen`]).
 pub fn imprint_and_refine(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -69,17 +73,20 @@ pub fn imprint_and_refine(
         s.contact_graph_below(params.wall_mm, params.least_contact_mm)
             .n_faults()
     };
-    let Some(mut best) = imprint(surface, prism) else {
+    let Some((cut, _)) = imprint(surface, prism) else {
         return Ok(None);
     };
-    if faults(&best.0) > 0
-        && let Some(refined) = refined_again(&ctx.fork(), params, &best.0)?
-        && let Some(again) = imprint(&refined, prism)
-        && faults(&again.0) < faults(&best.0)
+    let mut best = Cow::Borrowed(surface);
+    if faults(&cut) > 0
+        && let Some(refined) = refined_again(&ctx.fork(), params, &cut)?
+        && let Some((again, _)) = imprint(&refined, prism)
+        && faults(&again) < faults(&cut)
     {
-        best = again;
+        best = Cow::Owned(refined);
     }
-    Ok(Some(best))
+    let cut = |s: &SegmentedSurface| imprint(s, prism).map(|(cut, key)| (cut, Some(key)));
+    let widened = widen(ctx, params, &best, &cut)?;
+    Ok(widened.and_then(|(surface, key)| Some((surface, key?))))
 }
 
 /// The patch with most of the surface in `prism`, if it contains nearly all of that and little else.

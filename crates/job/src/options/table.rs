@@ -2,6 +2,7 @@
 //!
 //! The command line, the page of the studio and Python offer the options of this table.
 
+use shellock::design::WallChoice;
 use shellock::segmentation::Method;
 
 use super::keep_whole::keep_whole;
@@ -411,6 +412,14 @@ pub const DECLARED: &[Declared] = &[
     )
     .default("auto")
     .with_hyphens(),
+    choice::<WallChoice>(MAKE, "wall", "KIND", |o, t| word(t).map(|v| o.wall = v))
+        .help(
+            "light, standard or sturdy",
+            "Kind of wall, if its thickness is auto: light, as thin as seams allow; standard, thick enough \
+             for a fall and for what people do with the kit by hand; sturdy, at least half as thick again \
+             as a light one, with a reserve",
+        )
+        .default("standard"),
     text(MAKE, "material", "NAME", |o, t| {
         material(t).map(|v| o.material = Some(v))
     })

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
+use shellock::design::WallChoice;
 use shellock::piece::LabelParams;
 use shellock::segmentation::Method;
 use shellock::sizes::SizeChoice;
@@ -239,6 +240,16 @@ impl Word for Method {
 impl Word for bool {
     fn all() -> Vec<(Self, &'static str, &'static str)> {
         vec![(true, "on", ""), (false, "off", "")]
+    }
+}
+
+impl Word for WallChoice {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        vec![
+            (Self::Light, "light", ""),
+            (Self::Standard, "standard", ""),
+            (Self::Sturdy, "sturdy", ""),
+        ]
     }
 }
 

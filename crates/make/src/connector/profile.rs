@@ -93,13 +93,17 @@ impl Section {
 
     /// Rectangle around all parts.
     pub fn bounds(&self) -> ProfileRect {
+        Self::bounds_of(self.male.iter().chain(&self.female).flatten())
+    }
+
+    /// Rectangle around some parts; empty, with its sides reversed, if there are none.
+    pub fn bounds_of<'a>(parts: impl Iterator<Item = &'a ProfileRect>) -> ProfileRect {
         let empty = ProfileRect {
             n0: f64::INFINITY,
             n1: f64::NEG_INFINITY,
             s0: f64::INFINITY,
             s1: f64::NEG_INFINITY,
         };
-        let parts = self.male.iter().chain(&self.female).flatten();
         parts.fold(empty, |all, part| ProfileRect {
             n0: all.n0.min(part.n0),
             n1: all.n1.max(part.n1),

@@ -1,13 +1,13 @@
 //! Halves of connectors, carved so that every way out stays free.
 
 use rayon::prelude::*;
+use shellock_geom::Volume;
 use shellock_geom::marching_cubes::{OffBand, contour};
-use shellock_geom::{Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, PatchId};
 
 use super::carve::{SweptVolume, subtract_sweeps};
-use super::trim::{self, Left, sections_left};
+use super::trim::{self, Body, Left, Wall, sections_left};
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_half};
 
@@ -132,10 +132,10 @@ impl Carver<'_> {
             .map(|&(r, _)| runs[r].clearance_mm())
             .fold(self.params.clearance_mm, f64::max);
         let room = Room::of(clearance_mm, self.grid, self.shell, q);
-        let floor_mm = self.grid.thickness_mm + clearance_mm;
-        let is_below = |p: Vec3| {
-            let depth_mm = self.grid.band.sample(&self.grid.depth, p);
-            depth_mm.is_some_and(|mm| mm > floor_mm)
+        let wall = Wall {
+            body: Body::of(&self.shell.bodies[q]),
+            thickness_mm: self.grid.thickness_mm,
+            depth_mm: &|p| self.grid.band.sample(&self.grid.depth, p),
         };
         mine.par_iter()
             .map(|&(r, h)| {
@@ -146,7 +146,7 @@ impl Carver<'_> {
                     0 => section.male.to_vec(),
                     _ => section.female.to_vec(),
                 };
-                let left = sections_left(self.params, run, &parts, [&whole, &half], &is_below);
+                let left = sections_left(self.params, run, &parts, [&whole, &half], &wall, clearance_mm);
                 ((r, h), (half, left))
             })
             .collect()

@@ -14,25 +14,67 @@ const FROM_SIDE: f64 = 0.1;
 /// all. Points on a part's edge, which clearances round off, make up a tenth.
 const WHOLE: f64 = 0.9;
 const MOST: f64 = 0.5;
+/// Least width to which a half must be rooted in its wall, mm: two lines of a filament printer.
+const LEAST_ROOT_MM: f64 = 0.8;
+/// Spacing of the points that are asked for a root, and their greatest distance from its middle, mm.
+const ROOT_STEP_MM: f64 = 0.2;
+const ROOT_BAND_MM: f64 = 0.1;
+/// Depth of that middle within the wall, mm.
+const ROOT_DEPTH_MM: f64 = 0.2;
+/// Number of sections on either side over which the width of a root is averaged, since a gap of 1 mm breaks
+/// nothing.
+const ROOT_REACH: usize = 2;
 /// Direction of the rays that tell inside from outside, along no edge of a connector.
 const RAY: Vec3 = Vec3::new(0.482, 0.659, 0.577);
 
-/// A section of a run: its place, in stations from the first, and the least share of any of its parts that
-/// carving left.
+/// A section of one half of a run, after carving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Left {
+    /// Place of the section, in stations from the first.
     pub at: f64,
+    /// Least share of any of its parts that is left.
     pub share: f64,
+    /// Width to which it is rooted in the wall, mm.
+    pub root_mm: f64,
+}
+
+/// The wall that a half hangs from.
+pub(super) struct Wall<'a> {
+    /// The body of the half's piece.
+    pub body: Body,
+    pub thickness_mm: f64,
+    /// Depth below the outer surface, mm; `None` far from the wall.
+    pub depth_mm: &'a (dyn Fn(Vec3) -> Option<f64> + Sync),
+}
+
+impl Wall<'_> {
+    /// Width to which the half `carved` is rooted in the wall at a station, mm: the length that both share of
+    /// a line shortly above the inner surface.
+    fn root_mm(&self, at: &RunStation, bounds: ProfileRect, carved: &Body) -> f64 {
+        let middle_mm = self.thickness_mm - ROOT_DEPTH_MM;
+        let is_near = |p: Vec3| {
+            let depth_mm = (self.depth_mm)(p);
+            depth_mm.is_some_and(|mm| (mm - middle_mm).abs() < ROOT_BAND_MM)
+        };
+        let steps = |from: f64, to: f64| {
+            let n = ((to - from) / ROOT_STEP_MM).ceil().max(0.0) as usize;
+            (0..n).map(move |i| from + (i as f64 + 0.5) * ROOT_STEP_MM)
+        };
+        let points = steps(bounds.n0, bounds.n1)
+            .flat_map(|n| steps(bounds.s0, bounds.s1).map(move |s| at.place(n, s)));
+        let n = points.filter(|p| is_near(*p) && carved.holds(*p) && self.body.holds(*p));
+        n.count() as f64 * ROOT_STEP_MM.powi(2) / (2.0 * ROOT_BAND_MM)
+    }
 }
 
 /// A solid that can be asked for points.
-struct Body {
+pub(super) struct Body {
     mesh: TriMesh,
     tree: TriangleBvh,
 }
 
 impl Body {
-    fn of(volume: &Volume) -> Self {
+    pub(super) fn of(volume: &Volume) -> Self {
         let mesh = volume.to_mesh();
         Self {
             tree: TriangleBvh::new(&mesh),
@@ -46,15 +88,19 @@ impl Body {
     }
 }
 
-/// Compares one half of a run, `whole` and `carved`, section by section. `parts` gives the half's parts of a
-/// section, and only points with `counts` are compared.
+/// Compares one half of a run, `whole` and `carved`, section by section, and measures its root. `parts` gives
+/// the half's parts of a section. Only points below the floor of the wall, `clearance_mm` below its inner
+/// surface, are compared.
 pub(super) fn sections_left(
     params: &ConnectorParams,
     run: &Run,
     parts: &dyn Fn(&Section) -> Vec<Option<ProfileRect>>,
     [whole, carved]: [&Volume; 2],
-    counts: &dyn Fn(Vec3) -> bool,
+    wall: &Wall<'_>,
+    clearance_mm: f64,
 ) -> Vec<Left> {
+    let floor_mm = wall.thickness_mm + clearance_mm;
+    let counts = |p: Vec3| (wall.depth_mm)(p).is_some_and(|mm| mm > floor_mm);
     let [whole, carved] = [whole, carved].map(Body::of);
     let share = |points: Vec<Vec3>| {
         let points = points.into_iter().filter(|p| counts(*p) && whole.holds(*p));
@@ -78,9 +124,12 @@ pub(super) fn sections_left(
                 let (at_a, at_b) = ((*at_a)?, (*at_b)?);
                 Some(share(points_between((a, at_a), (b, at_b), t)))
             });
+            let station = station_at(run, i as f64 + t);
+            let bounds = Section::bounds_of(sections.iter().flatten().flatten());
             all.push(Left {
                 at: i as f64 + t,
                 share: shares.fold(1.0, f64::min),
+                root_mm: wall.root_mm(&station, bounds, &carved),
             });
         }
     }
@@ -103,10 +152,10 @@ fn points_between(
 /// The stretches of `run` on which both halves are `left` whole; `None` where that is all of it. Where there
 /// is none long enough, the stretches on which most is left; a run without any is given up.
 pub(super) fn trimmed(run: &Run, left: [&[Left]; 2]) -> Option<Vec<Run>> {
-    let shares: Vec<(f64, f64)> = left[0]
-        .iter()
-        .zip(left[1])
-        .map(|(male, female)| (male.at, male.share.min(female.share)))
+    let [male, female] = left.map(shares);
+    let both = left[0].iter().zip(male.into_iter().zip(female));
+    let shares: Vec<(f64, f64)> = both
+        .map(|(at, (male, female))| (at.at, male.min(female)))
         .collect();
     let all_have = |least: f64| shares.iter().all(|(_, share)| *share >= least);
     if all_have(WHOLE) {
@@ -117,6 +166,16 @@ pub(super) fn trimmed(run: &Run, left: [&[Left]; 2]) -> Option<Vec<Run>> {
         return Some(whole);
     }
     (!all_have(MOST)).then(|| stretches(run, &shares, MOST))
+}
+
+/// Share of each section that is left, and at most the share of the least root that its neighbourhood has.
+fn shares(left: &[Left]) -> Vec<f64> {
+    let root_mm = |i: usize| {
+        let around = &left[i.saturating_sub(ROOT_REACH)..(i + ROOT_REACH + 1).min(left.len())];
+        around.iter().map(|l| l.root_mm).sum::<f64>() / around.len() as f64
+    };
+    let share = |(i, left): (usize, &Left)| left.share.min(root_mm(i) / LEAST_ROOT_MM);
+    left.iter().enumerate().map(share).collect()
 }
 
 /// The stretches of `run` on which at least `least` of each section is left.
@@ -254,7 +313,12 @@ mod tests {
     fn left(run: &Run, share: impl Fn(f64) -> f64) -> Vec<Left> {
         let n = 8 * (run.stations.len() - 1);
         let at = (0..n).map(|i| (f64::from(i as u32) + 0.5) / 8.0);
-        at.map(|at| Left { at, share: share(at) }).collect()
+        at.map(|at| Left {
+            at,
+            share: share(at),
+            root_mm: 1.0,
+        })
+        .collect()
     }
 
     #[test]
@@ -309,7 +373,15 @@ mod tests {
         let [pin, _] = whole_halves(&params, &run);
         let cut = shellock_testkit::shapes::cuboid([8.0, -9.0, -9.0], [20.5, 9.0, -0.75]);
         let parts = |section: &Section| section.male.to_vec();
-        let found = sections_left(&params, &run, &parts, [&pin, &pin.subtract(&cut)], &|p| p.z < 0.0);
+        let wall = Wall {
+            body: Body::of(&shellock_testkit::shapes::cuboid(
+                [-1.0, -9.0, 0.0],
+                [15.0, 9.0, 2.0],
+            )),
+            thickness_mm: 2.0,
+            depth_mm: &|p| Some(2.0 - p.z),
+        };
+        let found = sections_left(&params, &run, &parts, [&pin, &pin.subtract(&cut)], &wall, 0.12);
         let x = |left: &Left| 5.0 * left.at;
         assert!(found.iter().filter(|l| x(l) < 7.8).all(|l| l.share == 1.0));
         // The pin is 1.5 mm deep, and half of that is gone.
@@ -319,5 +391,15 @@ mod tests {
                 .filter(|l| x(l) > 8.2)
                 .all(|l| (0.4..0.6).contains(&l.share))
         );
+        // The pin is 1 mm wide where it enters the wall, which ends at 15 mm.
+        assert!(
+            found
+                .iter()
+                .filter(|l| x(l) < 14.5)
+                .all(|l| (l.root_mm - 1.0).abs() < 0.25)
+        );
+        assert!(found.iter().filter(|l| x(l) > 15.5).all(|l| l.root_mm == 0.0));
+        let rooted = trimmed(&run, [&found, &found]).unwrap();
+        assert!(rooted.len() == 1 && rooted[0].length() < 8.5);
     }
 }

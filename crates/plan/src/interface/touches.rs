@@ -57,7 +57,8 @@ fn order(interface: &Interface, plan: &LatticePlan) -> (f64, [PatchId; 2]) {
     }
 }
 
-/// Contacts of all pins of a plan with their channels, each a clearance apart.
+/// Contacts of all pins of a plan with their channels, each a clearance apart; those of a key that slides on
+/// rails by its own clearance.
 pub fn pin_contacts(params: &PlanParams, interfaces: &[Interface], plan: &LatticePlan) -> Vec<Contact> {
     let leaves = Leave::all(plan);
     let of_pair = |interface: &Interface| pins(params, interface, plan, &leaves);
@@ -72,12 +73,16 @@ fn pins(params: &PlanParams, interface: &Interface, plan: &LatticePlan, leaves: 
         let sights = x.sights.as_ref();
         !sights.is_some_and(|sights| sights.is_blocked(pair, later == interface.a, leaves))
     };
+    let gap_mm = match params.slides_on_rails(later, s) {
+        true => params.key_gap_mm.max(params.clearance_mm),
+        false => params.clearance_mm,
+    };
     let contact = |(of_later, point, normal): (bool, Vec3, Vec3)| Contact {
         a: if of_later { later } else { earlier },
         b: if of_later { earlier } else { later },
         point,
         normal,
-        gap_mm: params.clearance_mm,
+        gap_mm,
         area_mm2: 0.0,
     };
     let mut found = Vec::new();

@@ -24,7 +24,7 @@ use table::{ANY, Level, TABLE};
 
 use super::cost::Cost;
 use super::ways::{Input, Walls, Way, ways};
-use super::{Params, Rounds, Thickness};
+use super::{Params, Rounds, Thickness, WallChoice};
 use crate::Ctx;
 use crate::metric::RESERVE;
 use crate::sizes::SizeChoice;
@@ -228,7 +228,7 @@ impl Agenda {
         if !matches!(params.connector.size, SizeChoice::Auto(_)) {
             forbidden.push(Step::Enlarge);
         }
-        if params.thickness != Thickness::Auto {
+        if params.thickness != Thickness::Auto || params.wall == WallChoice::Light {
             forbidden.push(Step::Thicken);
         }
         if input.labels.is_some() {

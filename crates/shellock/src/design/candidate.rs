@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use shellock_divide::widen;
 use shellock_geom::Solid;
 
 use super::division::Division;
@@ -73,6 +74,10 @@ impl<'a> Candidate<'a> {
     ) -> Result<Option<Division>, DesignError> {
         let mut settings = self.settings(job);
         let Some(key) = &self.key else {
+            let params = &settings.segmentation;
+            let as_it_is = |s: &SegmentedSurface| Some((s.clone(), None));
+            let widened = widen(ctx, params, &surface, &as_it_is)?;
+            let surface = widened.map_or(surface, |(surface, _)| surface);
             settings.plan.key = job.key_of(&surface);
             return Ok(Some(Division {
                 sizes: self.sizes(ctx, job, &settings, &surface)?,

@@ -6,6 +6,7 @@ use shellock_geom::TriMesh;
 use super::agenda::{Agenda, Effort};
 use super::best::{Best, Kept};
 use super::causes::Cause;
+use super::wall::WallChoices;
 use super::ways::Input;
 use super::{KeySource, Kit, Planned, Settings};
 use crate::body::GridError;
@@ -29,6 +30,8 @@ pub struct Design {
     pub settings: Settings,
     /// Site where the key was cut; `None` if the key is one of the pieces.
     pub key: Option<KeySite>,
+    /// The kinds of wall that the user may choose from; `None` if the user gave the thickness.
+    pub walls: Option<WallChoices>,
     /// Stress analysis of the wall; `None` if the stress could not be computed, which is warned of.
     pub strength: Option<Strength>,
     /// Gaps between pieces, at rest and on their ways out.
@@ -135,6 +138,7 @@ fn finish(ctx: &Ctx, input: &Input<'_>, kept: Kept<Kit>, effort: Effort) -> Resu
         settings,
         key,
         strength: wall.strength.clone(),
+        walls: wall.choices,
         gaps,
         fit,
         thin,

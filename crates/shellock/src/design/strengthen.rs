@@ -4,13 +4,13 @@
 //! The same plan is first rated with each change. Then planning begins anew with it. A plan that is far too
 //! weak early in its climb is changed at once, since the rest of the climb would be lost.
 
-use super::DesignError;
 use super::agenda::{Allowance, Permit, Step};
 use super::causes::Cause;
 use super::division::Division;
 use super::planning::Planning;
 use super::trial::Change;
 use super::wall::Thicker;
+use super::{DesignError, WallChoice};
 use crate::handling::Handling;
 use crate::metric::{ChoiceError, LoadBorne, Stand, WhatIf, is_worth, weakest_use};
 use crate::{Ctx, PatchId, Warning, segmentation};
@@ -75,8 +75,17 @@ pub(super) fn strengthen(
         Some((sizes, borne)) => (sizes, *borne),
         None => (&division.sizes, before),
     };
+    // A thicker wall weighs most of all remedies, so a standard one is not made thicker for the sake of a
+    // reserve.
+    let rating = WhatIf {
+        least_factor: match planning.input.params.wall {
+            WallChoice::Sturdy => asked,
+            WallChoice::Light | WallChoice::Standard => asked.min(ONCE),
+        },
+        ..rating
+    };
     let wall = allowance.permit(Step::Thicken);
-    if wall != Permit::No {
+    if wall != Permit::No && borne < TOLERANCE * rating.least_factor {
         let input = planning.input;
         let is_hollow = |mm| input.params.allows_thin || planning.cavity.is_hollow(input.model, mm).is_ok();
         let most_mm = division.settings.strength.most_mm;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::causes::Cause;
 use super::ways::{Input, Way};
-use super::{DesignError, Params, Settings, Thickness};
+use super::{DesignError, Params, Settings, Thickness, WallChoice};
 use crate::strength::{self, Cavity, Strength, StrengthError};
 use crate::{Ctx, Warning};
 
@@ -17,12 +17,57 @@ pub(super) struct Wall {
     pub error: Option<String>,
     /// Estimates of the model's cavity.
     pub cavity: Arc<Cavity>,
+    /// Thickness of a wall of each kind before it is made thicker for the sake of use, if it is ours to
+    /// choose.
+    pub choices: Option<WallChoices>,
     /// True if the thickness is ours to choose.
     is_free: bool,
     /// True if the model is not divided by the method that was asked for.
     is_divided_otherwise: bool,
     /// Thickness that a fall asks for, and the reason for a thicker wall.
     thicker: Option<(f64, Thicker)>,
+}
+
+/// Thickness of a wall of each kind, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WallChoices {
+    /// The kind that the user wants.
+    pub wanted: WallChoice,
+    /// As thin as seams allow.
+    pub light_mm: f64,
+    /// The thinnest that survives a fall.
+    pub standard_mm: f64,
+    /// At least half as thick again as a light one.
+    pub sturdy_mm: f64,
+}
+
+impl WallChoices {
+    /// Ratio of the least sturdy wall to a light one.
+    const STURDY: f64 = 1.5;
+
+    /// Walls of a model for which `strength` is the thinnest that survives a fall; `least_mm` is the usual
+    /// thinnest one.
+    fn of(wanted: WallChoice, strength: &Strength, least_mm: f64) -> Self {
+        let standard_mm = strength.thickness_mm;
+        // A model with little room has thinner walls than usual.
+        let light_mm = least_mm.min(standard_mm);
+        let sturdy_mm = (Self::STURDY * light_mm).min(strength.most_mm).max(standard_mm);
+        Self {
+            wanted,
+            light_mm,
+            standard_mm,
+            sturdy_mm,
+        }
+    }
+
+    /// Thickness of the wall that the user wants, mm.
+    fn wanted_mm(&self) -> f64 {
+        match self.wanted {
+            WallChoice::Light => self.light_mm,
+            WallChoice::Standard => self.standard_mm,
+            WallChoice::Sturdy => self.sturdy_mm,
+        }
+    }
 }
 
 /// Wall that is thicker for the sake of a use.
@@ -41,6 +86,7 @@ impl Wall {
             strength: None,
             error: None,
             cavity: Arc::default(),
+            choices: None,
             is_free: params.thickness == Thickness::Auto,
             is_divided_otherwise: false,
             thicker: None,
@@ -60,23 +106,33 @@ impl Wall {
             Thickness::Auto => None,
         };
         let (limits, cavity) = (&self.settings.strength, &self.cavity);
-        Ok(
-            match strength::decide(&ctx.fork(), limits, model, cavity, given_mm, params.allows_thin)? {
-                Ok(strength) => {
-                    let mut settings = Settings::with_thickness(params, strength.thickness_mm);
-                    settings.strength.most_mm = strength.most_mm;
-                    Self {
-                        settings,
-                        strength: Some(strength),
-                        ..self
-                    }
-                }
-                Err(error) => Self {
-                    error: Some(StrengthError::from(error).to_string()),
+        let decide = |mm| strength::decide(&ctx.fork(), limits, model, cavity, mm, params.allows_thin);
+        let mut decided = decide(given_mm)?;
+        let mut choices = self.choices;
+        if let (Ok(thinnest), None) = (&decided, given_mm) {
+            let found = WallChoices::of(params.wall, thinnest, limits.least_mm);
+            let (mm, most_mm) = (found.wanted_mm(), thinnest.most_mm);
+            choices = Some(found);
+            if mm != thinnest.thickness_mm {
+                decided = decide(Some(mm))?.map(|chosen| Strength { most_mm, ..chosen });
+            }
+        }
+        Ok(match decided {
+            Ok(strength) => {
+                let mut settings = Settings::with_thickness(params, strength.thickness_mm);
+                settings.strength.most_mm = strength.most_mm;
+                Self {
+                    settings,
+                    strength: Some(strength),
+                    choices,
                     ..self
-                },
+                }
+            }
+            Err(error) => Self {
+                error: Some(StrengthError::from(error).to_string()),
+                ..self
             },
-        )
+        })
     }
 
     /// This wall for pieces that are cut in another way.
@@ -121,6 +177,7 @@ impl Wall {
         let nominal = Self {
             is_free: self.is_free,
             cavity: self.cavity.clone(),
+            choices: self.choices,
             ..Self::nominal(params)
         };
         nominal.with_strength(ctx, &Input { params, ..*input })
