@@ -30,8 +30,8 @@ pub struct HangingPart {
 /// largest part of all. Parts whose eroded volume is less than `least_mm3` do not count.
 ///
 /// `ball_mm` is the ball's diameter, `voxel_mm` the edge of the voxels: a quarter of the diameter or less.
-/// Where the mesh overlaps itself, the union counts. Empty for a mesh that is larger than 8192 voxels. Time and
-/// memory are O(surface / voxel²), apart from one layer of voxels.
+/// Where the mesh overlaps itself, the union counts. Empty for a mesh that is larger than 8192 voxels. Time
+/// and memory are O(surface / voxel²), apart from one layer of voxels.
 pub fn hanging_parts(mesh: &TriMesh, ball_mm: f64, voxel_mm: f64, least_mm3: f64) -> Vec<HangingPart> {
     let Some(grid) = Grid::around(mesh, voxel_mm) else {
         return Vec::new();

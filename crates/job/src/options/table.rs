@@ -433,7 +433,8 @@ pub const DECLARED: &[Declared] = &[
             "Height of the fall that walls must survive, 0.01 to 20 m",
         )
         .default("1.275")
-        .with_hyphens(),
+        .with_hyphens()
+        .mark_advanced(),
     text(MAKE, "connector", "auto|MM", |o, t| {
         connector_size(t).map(|v| o.connector = v)
     })

@@ -384,12 +384,12 @@ mod tests {
         let found = sections_left(&params, &run, &parts, [&pin, &pin.subtract(&cut)], &wall, 0.12);
         let x = |left: &Left| 5.0 * left.at;
         assert!(found.iter().filter(|l| x(l) < 7.8).all(|l| l.share == 1.0));
-        // The pin is 1.5 mm deep, and half of that is gone.
+        // The pin is 1.5 mm deep, and half of that is gone: two of three rows of points.
         assert!(
             found
                 .iter()
                 .filter(|l| x(l) > 8.2)
-                .all(|l| (0.4..0.6).contains(&l.share))
+                .all(|l| (0.3..0.6).contains(&l.share))
         );
         // The pin is 1 mm wide where it enters the wall, which ends at 15 mm.
         assert!(
