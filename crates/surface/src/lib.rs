@@ -1,7 +1,7 @@
 //! The outer surface with its patches, the result of segmentation that all later stages use, and the seams
 //! between them.
 
-pub mod neck;
+pub mod narrow;
 pub mod plane;
 pub mod seam;
 mod turn;

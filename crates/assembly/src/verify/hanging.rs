@@ -51,7 +51,7 @@ mod tests {
             _ => None,
         };
         assert_eq!(width(2.0, 0.7), Some(NECKS[0].0));
-        assert_eq!(width(2.0, 1.1), Some(NECKS[1].0));
+        assert_eq!(width(2.5, 1.1), Some(NECKS[1].0));
         assert_eq!(width(2.0, 1.6), None);
         assert_eq!(width(0.8, 1.0), None);
     }

@@ -12,7 +12,7 @@
 //! | overlap with what stops a push | 0.5 mm³ | a tenth more | less shears off or slips past |
 //! | surface of a piece that folds back on itself | 0 | 0.5 mm² | a slit of 2 µm does no harm (5) |
 //! | part that hangs on a neck of 0.8 mm | 5 mm³ inside | 4.5 mm³, 0.85 mm | a lug of 2 mm breaks off |
-//! | part that hangs on a neck of 1.2 mm | | 10 mm³, 1.25 mm | so does a larger one (6) |
+//! | part that hangs on a neck of 1.2 mm | | 10 mm³, 1.22 mm | so does a larger one (6) |
 //! | length of a push ([`crate::push`]) | 3 clearances + 0.6 mm | equal | more than all play (4) |
 //!
 //! (1) Joints cut without any gap share 0.07 mm³ by rounding alone. (2) Measured by rays here. (3) Four sigma
@@ -38,9 +38,9 @@ pub const HOLD_MM3: f64 = 0.55;
 pub const FOLD_MM2: f64 = 0.5;
 /// Necks that break: their width, mm, and the greatest volume that may hang on them, without its outermost
 /// layer, mm³. What hangs on a thinner neck may itself be too thin to be seen with the greater width.
-pub const NECKS: [(f64, f64); 2] = [(0.85, 4.5), (1.25, 10.0)];
+pub const NECKS: [(f64, f64); 2] = [(0.85, 4.5), (1.22, 10.0)];
 /// Greatest such width as a share of the mean wall of a piece, for thin walls.
-pub const NECK_WALLS: f64 = 0.8;
+pub const NECK_WALLS: f64 = 0.75;
 /// Width below which slots within one piece are reported, mm: resin fuses them, and no nozzle leaves them
 /// open.
 pub const LEAST_SLOT_MM: f64 = 0.2;
