@@ -177,14 +177,9 @@ mod tests {
     }
 
     fn n_components(mesh: &shellock_geom::TriMesh) -> usize {
+        use shellock_geom::union_find::root;
+
         let mut parent: Vec<u32> = (0..mesh.points.len() as u32).collect();
-        fn root(parent: &mut [u32], mut v: u32) -> u32 {
-            while parent[v as usize] != v {
-                parent[v as usize] = parent[parent[v as usize] as usize];
-                v = parent[v as usize];
-            }
-            v
-        }
         for t in &mesh.triangles {
             for &v in &t[1..] {
                 let (a, b) = (root(&mut parent, t[0]), root(&mut parent, v));

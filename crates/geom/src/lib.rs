@@ -33,6 +33,7 @@ pub mod subdivide;
 pub mod sweep;
 pub mod thin;
 pub mod topology;
+pub mod union_find;
 pub mod weld;
 pub mod work;
 

@@ -6,6 +6,7 @@
 //! Voxels are bits: a row along x is a sequence of words, and erosion is a conjunction of shifted rows.
 //! Layers are swept in z, and only as many are held as the ball is high, so memory follows the surface.
 
+use crate::union_find::root;
 use crate::{TriMesh, Vec3};
 
 /// Offset of the voxel centres from round numbers, mm: surfaces with round coordinates pass between them.
@@ -337,14 +338,6 @@ fn runs_of(row: &[u64]) -> impl Iterator<Item = [u32; 2]> {
         at = next(from, false);
         (from < n).then_some([from, at])
     })
-}
-
-fn root(parent: &mut [u32], mut v: u32) -> u32 {
-    while parent[v as usize] != v {
-        parent[v as usize] = parent[parent[v as usize] as usize];
-        v = parent[v as usize];
-    }
-    v
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use shellock_geom::laplacian::{half_cotangents, lumped_mass};
 use shellock_geom::sparse::{Cholesky, SparseSymmetric};
+use shellock_geom::union_find::root;
 use shellock_geom::{Solid, TriMesh};
 use shellock_report::{Ctx, PatchId};
 use shellock_surface::SegmentedSurface;
@@ -181,13 +182,6 @@ fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize
 /// True for each point in a part of its patch that is not the patch's largest.
 fn islands(mesh: &TriMesh, mass: &[f64], owner: &[u32], n_patches: usize) -> Vec<bool> {
     let mut parent: Vec<u32> = (0..owner.len() as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
     for &[a, b, c] in &mesh.triangles {
         for (x, y) in [(a, b), (b, c), (c, a)] {
             if owner[x as usize] == owner[y as usize] {

@@ -45,13 +45,12 @@ impl WallChoices {
     /// Ratio of the least sturdy wall to a light one.
     const STURDY: f64 = 1.5;
 
-    /// Walls of a model for which `strength` is the thinnest that survives a fall; `least_mm` is the usual
-    /// thinnest one.
-    fn of(wanted: WallChoice, strength: &Strength, least_mm: f64) -> Self {
-        let standard_mm = strength.thickness_mm;
+    /// Walls of a model. The thinnest that survives a fall has `standard_mm`, and there is room for `most_mm`;
+    /// `least_mm` is the usual thinnest wall.
+    fn of(wanted: WallChoice, standard_mm: f64, most_mm: f64, least_mm: f64) -> Self {
         // A model with little room has thinner walls than usual.
         let light_mm = least_mm.min(standard_mm);
-        let sturdy_mm = (Self::STURDY * light_mm).min(strength.most_mm).max(standard_mm);
+        let sturdy_mm = (Self::STURDY * light_mm).min(most_mm).max(standard_mm);
         Self {
             wanted,
             light_mm,
@@ -110,7 +109,12 @@ impl Wall {
         let mut decided = decide(given_mm)?;
         let mut choices = self.choices;
         if let (Ok(thinnest), None) = (&decided, given_mm) {
-            let found = WallChoices::of(params.wall, thinnest, limits.least_mm);
+            let found = WallChoices::of(
+                params.wall,
+                thinnest.thickness_mm,
+                thinnest.most_mm,
+                limits.least_mm,
+            );
             let (mm, most_mm) = (found.wanted_mm(), thinnest.most_mm);
             choices = Some(found);
             if mm != thinnest.thickness_mm {
@@ -219,5 +223,22 @@ impl Thicker {
             "it would give way where it is {}: walls of {:.1} mm",
             self.load, self.thickness_mm
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_light_wall_is_the_thinnest_and_a_sturdy_one_the_thickest_that_has_room() {
+        for [standard_mm, most_mm] in [[1.6, 6.0], [2.0, 6.0], [3.4, 6.0], [1.6, 2.0], [1.1, 1.1]] {
+            let walls = WallChoices::of(WallChoice::Sturdy, standard_mm, most_mm, 1.6);
+            assert!(walls.light_mm <= walls.standard_mm && walls.standard_mm <= walls.sturdy_mm);
+            assert!(walls.light_mm <= 1.6 && walls.sturdy_mm <= most_mm.max(standard_mm));
+            let half_again_mm = 1.5 * walls.light_mm;
+            assert!(walls.sturdy_mm >= half_again_mm.min(most_mm) - 1e-9, "{walls:?}");
+            assert_eq!(walls.wanted_mm(), walls.sturdy_mm);
+        }
     }
 }

@@ -15,6 +15,7 @@
 //! visited before. Where two components meet that both have a core, there is a saddle.
 
 use shellock_geom::Vec3;
+use shellock_geom::union_find::root;
 use shellock_report::PatchId;
 
 use super::web::Web;
@@ -109,12 +110,4 @@ fn neck(web: &Web, saddle: &Saddle, depth: &[f64]) -> Neck {
         part_mm2: areas[0].min(areas[1]),
         part: web.sources_with(patch, |t| t.into_iter().map(lead_mm).sum::<f64>() > 0.0),
     }
-}
-
-fn root(parent: &mut [u32], mut v: u32) -> u32 {
-    while parent[v as usize] != v {
-        parent[v as usize] = parent[parent[v as usize] as usize];
-        v = parent[v as usize];
-    }
-    v
 }
