@@ -45,8 +45,8 @@ impl WallChoices {
     /// Ratio of the least sturdy wall to a light one.
     const STURDY: f64 = 1.5;
 
-    /// Walls of a model. The thinnest that survives a fall has `standard_mm`, and there is room for `most_mm`;
-    /// `least_mm` is the usual thinnest wall.
+    /// Walls of a model. The thinnest that survives a fall has `standard_mm`; the usual thinnest wall has
+    /// `least_mm`, and there is room for `most_mm`.
     fn of(wanted: WallChoice, standard_mm: f64, most_mm: f64, least_mm: f64) -> Self {
         // A model with little room has thinner walls than usual.
         let light_mm = least_mm.min(standard_mm);
