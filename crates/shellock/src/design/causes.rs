@@ -38,8 +38,8 @@ impl Diagnostic for Cause {
             Self::WallForUse { from_mm, to_mm, load } => Told::note(
                 "wall-for-use",
                 format!(
-                    "walls are {to_mm:.1} mm thick, so that seams stay closed when the kit is {load}; \
-                     {from_mm:.1} mm are enough for a fall"
+                    "walls are {to_mm:.1} mm thick instead of {from_mm:.1} mm, so that seams stay closed \
+                     when the kit is {load}"
                 ),
             )
             .by(&["thickness"]),
