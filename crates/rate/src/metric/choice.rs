@@ -376,13 +376,16 @@ fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
         return;
     };
     // Forces go with the root of the height, so heights go with the square of the factor.
-    let much = |factor: f64| {
+    let much = |factor: f64, digits: usize| {
         if weakest.deed.is_fall() {
-            format!("a fall of {:.1} m", 1e-3 * DROP_MM * factor * factor)
+            let height_m = 1e-3 * DROP_MM * factor * factor;
+            format!("a fall of {height_m:.*} m", digits + 1)
         } else {
-            format!("{:.0} N", factor * weakest.force_n)
+            format!("{:.digits$} N", factor * weakest.force_n)
         }
     };
+    // As many digits as tell the two apart.
+    let digits = (0..3).find(|&n| much(factor, n) != much(1.0, n)).unwrap_or(3);
     let gives_way = match first.how {
         Failure::Opens => "the seam opens",
         Failure::PinYields => "pins bend",
@@ -391,8 +394,8 @@ fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
     ctx.warn(Warning::new(
         Cause::BearsLittle {
             load: weakest.deed.words().to_owned(),
-            bears: much(factor),
-            requirement: much(1.0),
+            bears: much(factor, digits),
+            requirement: much(1.0, digits),
             gives_way: gives_way.to_owned(),
         },
         first.between.to_vec(),
