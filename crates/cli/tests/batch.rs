@@ -22,7 +22,7 @@ fn output_of(o: &Output) -> String {
 fn what_is_made_stays_what_is_not_is_told_and_kits_are_those_of_build() {
     let dir = tempfile::tempdir().unwrap();
     fs::create_dir_all(dir.path().join("models/below")).unwrap();
-    let options = "--size 60mm --time 0 --method creases --pieces 5 --thickness 2mm";
+    let options = "--size 60mm --time 0 --method creases --pieces 4 --thickness 2mm";
     shellock(dir.path(), "figure vase --out models/below/vase.stl --size 60");
     fs::write(dir.path().join("models/junk.stl"), "solid\n").unwrap();
     let job = format!("batch models --out kits {options}");
