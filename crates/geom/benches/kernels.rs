@@ -76,7 +76,7 @@ fn lay_band(bencher: Bencher) {
 fn sweep_diagonal(bencher: Bencher) {
     let (band, depth) = band(&ball());
     let sweeper = Sweeper::new(&band);
-    bencher.bench(|| sweeper.max_ahead(black_box(&depth), [1, 1, 1]));
+    bencher.bench(|| sweeper.max_ahead(black_box(&depth), [1, 1, 1], Draft::NONE));
 }
 
 #[divan::bench]

@@ -200,6 +200,13 @@ impl Band {
         Some(at)
     }
 
+    /// Nodes around `node`, at most 26: those with a path in the band along y, then z, then x.
+    pub fn all_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        (0..27)
+            .filter(|&i| i != 13)
+            .filter_map(move |i| self.neighbour(node, [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]))
+    }
+
     /// Nodes next to `node` along the axes, at most six.
     pub fn face_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
         let along_x = [-1, 1]

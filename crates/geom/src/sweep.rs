@@ -10,6 +10,26 @@ use crate::band::Band;
 /// ridge between two nodes would be missed. Along an axis the interpolant is linear, so nodes are enough.
 const SUB_STEPS: usize = 3;
 
+/// Amount by which values ahead count for more: `per_mm` for each mm to them, at most `most_mm`. The swept
+/// volume of a body with field values in mm then widens along the way, as moulded parts do.
+///
+/// Where a line leaves the band and comes back, the way outside counts as one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Draft {
+    /// Rise for each mm to the value, field units per mm.
+    pub per_mm: f32,
+    /// Greatest rise, field units.
+    pub most_mm: f32,
+}
+
+impl Draft {
+    /// No draft: a plain running maximum.
+    pub const NONE: Self = Self {
+        per_mm: 0.0,
+        most_mm: 0.0,
+    };
+}
+
 /// Lines of a band in each of the 13 lattice line directions, computed on first use and then kept.
 pub struct Sweeper<'a> {
     band: &'a Band,
@@ -33,14 +53,16 @@ impl<'a> Sweeper<'a> {
     }
 
     /// Computes `max over t ≥ 0 of field(x + t·step)` at every node x. `step` has components in {−1, 0, 1},
-    /// not all 0.
+    /// not all 0. With a `draft`, values that lie ahead count for more.
     ///
     /// Off the band the field counts as −∞, so a line may leave the band and come back. Between nodes the
     /// trilinear interpolant is sampled at three inner points of each diagonal step.
-    pub fn max_ahead(&self, field: &[f32], step: [i32; 3]) -> Vec<f32> {
+    pub fn max_ahead(&self, field: &[f32], step: [i32; 3], draft: Draft) -> Vec<f32> {
         let (line, forwards) = line_of(step);
         let lines = self.lines[line].get_or_init(|| Lines::new(self.band, positive(step)));
         let ahead = self.with_sub_steps(field, step);
+        let length = step.map(|x| (x * x) as f32).iter().sum::<f32>().sqrt();
+        let rise = draft.per_mm * length * self.band.cell_mm() as f32;
         // Each line writes to its own stretch of `swept`; the values are then copied back to their nodes.
         let mut swept: Vec<f32> = lines.order.par_iter().map(|&n| ahead[n as usize]).collect();
         let mut stretches: Vec<&mut [f32]> = Vec::with_capacity(lines.start.len());
@@ -51,10 +73,11 @@ impl<'a> Sweeper<'a> {
             rest = tail;
         }
         stretches.into_par_iter().with_min_len(256).for_each(|stretch| {
-            let mut best = f32::NEG_INFINITY;
+            let (mut best, mut raised) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
             let mut visit = |x: &mut f32| {
                 best = best.max(*x);
-                *x = best;
+                raised = (raised + rise).max(*x);
+                *x = raised.min(best + draft.most_mm);
             };
             if forwards {
                 stretch.iter_mut().rev().for_each(&mut visit)
@@ -202,7 +225,7 @@ mod tests {
         let reach = *band.dims.iter().max().unwrap() as i64;
         for step in all_steps() {
             let inner = sweeper.with_sub_steps(&field, step);
-            let swept = sweeper.max_ahead(&field, step);
+            let swept = sweeper.max_ahead(&field, step, Draft::NONE);
             for node in (0..band.len()).step_by(41) {
                 let from = band.coords[node].map(i64::from);
                 let expected = (0..=reach)
@@ -215,11 +238,43 @@ mod tests {
     }
 
     #[test]
+    fn a_draft_raises_values_by_the_way_to_them_and_no_more_than_its_limit() {
+        let (band, phi) = cube_band();
+        let sweeper = Sweeper::new(&band);
+        let draft = Draft {
+            per_mm: 0.08,
+            most_mm: 0.2,
+        };
+        let reach = *band.dims.iter().max().unwrap() as i64;
+        for step in all_steps() {
+            let inner = sweeper.with_sub_steps(&phi, step);
+            let swept = sweeper.max_ahead(&phi, step, draft);
+            let length = f64::from(step.map(|x| x * x).iter().sum::<i32>()).sqrt() * band.cell_mm();
+            for node in (0..band.len()).step_by(41) {
+                let from = band.coords[node].map(i64::from);
+                let values: Vec<f64> = (0..=reach)
+                    .filter_map(|t| band.node_at(std::array::from_fn(|a| from[a] + t * i64::from(step[a]))))
+                    .map(|n| f64::from(inner[n as usize]))
+                    .collect();
+                let most = |rise: &dyn Fn(f64) -> f64| {
+                    let raised = values
+                        .iter()
+                        .enumerate()
+                        .map(|(t, v)| v + rise(t as f64 * length));
+                    raised.fold(f64::NEG_INFINITY, f64::max)
+                };
+                let expected = most(&|mm| 0.08 * mm).min(most(&|_| 0.0) + 0.2);
+                assert!((f64::from(swept[node]) - expected).abs() < 1e-4, "{step:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_swept_field_never_grows_along_its_step() {
         let (band, phi) = cube_band();
         let sweeper = Sweeper::new(&band);
         for step in all_steps() {
-            let swept = sweeper.max_ahead(&phi, step);
+            let swept = sweeper.max_ahead(&phi, step, Draft::NONE);
             for node in (0..band.len() as u32).step_by(13) {
                 if let Some(next) = band.neighbour(node, step) {
                     assert!(swept[next as usize] <= swept[node as usize]);

@@ -8,8 +8,8 @@
 //! φ_p                                            beyond the sheets through p's seams (`sheets`);
 //!                                                away from them ½ (min_j d_j − d_p), nearer to
 //!                                                patch p than to any patch j that remains
-//! U   = max_{t ≥ 0} skin_p(x − t s)              ahead of p's outer skin: must go with p
-//! V   = max_{t ≥ 0} (E' + margin)(x + t s)       behind what remains: must stay
+//! U   = max_{t ≥ 0} skin_p(x − t s) + draft(t)   ahead of p's outer skin: must go with p
+//! V   = max_{t ≥ 0} (E' + m)(x + t s) + draft(t) behind what remains, by a margin m: must stay
 //! g_p = min(max(φ_p, U), −V)                     p's side is positive
 //! ```
 //!

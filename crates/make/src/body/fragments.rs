@@ -35,12 +35,30 @@ impl<'a> Fragments<'a> {
             minor_components(self.grid, member).concat()
         };
         let (lost, gained) = rayon::join(|| fragments(1.0), || fragments(-1.0));
-        lost.iter().for_each(|&n| g[n as usize] = -away_mm);
-        gained.iter().for_each(|&n| g[n as usize] = away_mm);
+        self.turn_over(&lost, -away_mm, g, rest);
+        self.turn_over(&gained, away_mm, g, rest);
         (!lost.is_empty() || !gained.is_empty()).then_some(Given {
             gains: gained,
             away_mm,
         })
+    }
+
+    /// Gives the nodes of `fragments` the value `to`, and also the nodes above and below the wall that have
+    /// no other side of the cut near them: the contour would otherwise step from node to node within the
+    /// wall.
+    fn turn_over(&self, fragments: &[u32], to: f32, g: &mut [f32], rest: &[f32]) {
+        fragments.iter().for_each(|&n| g[n as usize] = to);
+        let band = &self.grid.band;
+        let is_on_other_side = |n: u32, g: &[f32]| {
+            let n = n as usize;
+            self.wall[n] && rest[n] > 0.0 && (g[n] > 0.0) != (to > 0.0)
+        };
+        let beside: Vec<u32> = fragments
+            .iter()
+            .flat_map(|&n| band.all_neighbours(n))
+            .filter(|&m| !self.wall[m as usize] && !band.all_neighbours(m).any(|k| is_on_other_side(k, g)))
+            .collect();
+        beside.into_iter().for_each(|m| g[m as usize] = to);
     }
 }
 

@@ -8,7 +8,7 @@ use shellock_geom::band::Band;
 use shellock_geom::decimate::decimate;
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_with_corners};
-use shellock_geom::sweep::Sweeper;
+use shellock_geom::sweep::{Draft, Sweeper};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId};
@@ -24,7 +24,13 @@ use super::{BodyError, BodyParams};
 const SKIN_CELLS: f64 = 1.5;
 /// Cells by which the remaining material is grown before it is swept, so that interpolation leaves no
 /// rubbing.
-const MARGIN_CELLS: f64 = 0.15;
+const MARGIN_CELLS: f64 = 0.1;
+/// Draft of all ways out. Contours of sampled fields are off by some hundredths of a mm, and a piece that
+/// slides along a wall without draft would rub on every bump. Without it relief cuts three times as much.
+const DRAFT: Draft = Draft {
+    per_mm: 0.08,
+    most_mm: 0.12,
+};
 /// Distance from the key's cut within which a node counts as part of its seam, mm.
 const KEY_REACH_MM: f32 = 1.5;
 /// Limits to the simplification of cutting tools. Where they cut, at most this share of the gap and this many
@@ -414,12 +420,12 @@ impl<'a> Separation<'a> {
             .into_par_iter()
             .map(|n| at(n, phi[n]).min(skin_mm - self.grid.depth[n]).max(-cutoff))
             .collect();
-        let ahead_of_skin = self.sweeper.max_ahead(&skin, along.map(|x| -x));
+        let ahead_of_skin = self.sweeper.max_ahead(&skin, along.map(|x| -x), DRAFT);
         let staying: Vec<f32> = (0..phi.len())
             .into_par_iter()
             .map(|n| (at(n, -phi[n]).min(-ahead_of_skin[n]) + margin).max(-cutoff))
             .collect();
-        let behind_staying = self.sweeper.max_ahead(&staying, along);
+        let behind_staying = self.sweeper.max_ahead(&staying, along, DRAFT);
         let mut g: Vec<f32> = (0..phi.len())
             .into_par_iter()
             .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
@@ -435,7 +441,7 @@ impl<'a> Separation<'a> {
                     .par_iter_mut()
                     .enumerate()
                     .for_each(|(n, f)| *f = at(n, *f).max(-cutoff));
-                let ahead = self.sweeper.max_ahead(&gained, along.map(|x| -x));
+                let ahead = self.sweeper.max_ahead(&gained, along.map(|x| -x), DRAFT);
                 g.par_iter_mut()
                     .zip(&ahead)
                     .for_each(|(g, ahead)| *g = g.max(*ahead));
@@ -444,7 +450,7 @@ impl<'a> Separation<'a> {
                 .into_par_iter()
                 .map(|n| at(n, -g[n]).max(-cutoff))
                 .collect();
-            let behind = self.sweeper.max_ahead(&staying, along);
+            let behind = self.sweeper.max_ahead(&staying, along, DRAFT);
             g.par_iter_mut()
                 .zip(&behind)
                 .for_each(|(g, behind)| *g = g.min(-behind));
@@ -479,8 +485,8 @@ impl<'a> Separation<'a> {
             .map(|n| self.wall(n, 0.0).min(self.rest[n]).max(-cutoff))
             .collect();
         let (behind_staying, ahead_of_p) = rayon::join(
-            || self.sweeper.max_ahead(&staying, along),
-            || self.sweeper.max_ahead(&body, along.map(|x| -x)),
+            || self.sweeper.max_ahead(&staying, along, DRAFT),
+            || self.sweeper.max_ahead(&body, along.map(|x| -x), DRAFT),
         );
         let in_way = behind_staying
             .iter()

@@ -13,13 +13,16 @@
 //! distance to the planes of the samples around,
 //!
 //! ```text
-//! φ(x) = Σ w_k B_k · (x − γ_k) / Σ w_k,   w_k = (1 − r_k²/R²)² / (r_k² + ε²)²,   r_k = |c(x) − γ_k|
+//! φ(x) = Σ w_k B_k · (x − γ_k) / Σ w_k,   w_k = (1 − r_k²/R²)² / (r_k² + ε²)²
 //! ```
 //!
-//! with c(x) the point of the surface nearest to x: implicit moving least squares [Kolluri 2005] with the
-//! weights of the surface. The field is zero on the seam, has slope 1, and is as smooth as the seam. (The
-//! difference of distances to the two patches has no slope where the surface is flat, and vanishes in the
-//! whole wedge below a concave edge.)
+//! with r_k the distance of x from the line through γ_k along the surface normal: implicit moving least
+//! squares [Kolluri 2005]. The field has slope 1 and is as smooth as the seam. (The distance of γ_k from the
+//! point of the surface nearest to x jumps below every convex edge of the model. The difference of distances
+//! to the two patches has no slope where the surface is flat, and vanishes in the whole wedge below a concave
+//! edge.)
+//!
+//! The samples lie on a smoothed seam: the seam itself turns at every triangle of the model.
 
 use rayon::prelude::*;
 use shellock_assembly::LatticeDirection;
@@ -31,18 +34,22 @@ use super::ShellGrid;
 
 /// Distance between samples along a seam, mm: a seam with a radius of 3 mm is followed within 4 µm.
 const STEP_MM: f64 = 0.3;
-/// Rounds of averaging normals and tangents with those of the neighbouring samples. They amount to a Gaussian
-/// of 0.95 mm (one sigma), so that bumps smaller than the wall thickness do not bend a sheet. Chosen by eye.
-const SMOOTHING_ROUNDS: usize = 20;
-/// Softening length ε, mm: a sixth of the step, so that a sheet passes through the samples. Chosen by eye.
-const LEAST_MM: f64 = 0.05;
+/// Rounds of averaging the points of a seam with their neighbours. They amount to a Gaussian of 0.95 mm (one
+/// sigma): a seam of 3 mm radius moves by 0.15 mm.
+const LINE_ROUNDS: usize = 20;
+/// Rounds of averaging normals and tangents. They amount to a Gaussian of 1.65 mm, so that bumps smaller than
+/// the wall thickness do not bend a sheet. With 20 rounds relief cuts a third more.
+const FRAME_ROUNDS: usize = 60;
+/// Softening length ε, mm: the step between samples. A field that followed each of them would be finer than
+/// the grid.
+const SOFT_MM: f64 = STEP_MM;
 /// Reach R of the weights, in cells: as far as fields are kept.
 const REACH_CELLS: f64 = 3.5;
 /// Share of R from which on the sheet blends into the distances to the patches. Chosen by eye.
 const SURE: f64 = 0.6;
-/// Least angle between a sheet and the way out, rad. The field of the remaining material is sampled on a
-/// grid, and would shave a sheet that is merely parallel to the way out.
-const DRAFT: f64 = 0.05;
+/// Least angle between a sheet and the way out, rad: more than the draft of the sweeps, which would shave the
+/// sheet otherwise.
+const DRAFT: f64 = 0.1;
 /// Greatest lean of a sheet, rad; beyond it edges become feather-thin.
 const MOST_LEAN: f64 = 1.0;
 /// Sine of the angle between the way out and the seam up to which a sheet need not lean, and that from which
@@ -58,6 +65,16 @@ struct Sample {
     normal: Vec3,
     /// The patches to the left and to the right of the tangent, as seen from outside.
     sides: [PatchId; 2],
+}
+
+/// The plane of a sample's sheet.
+#[derive(Clone, Copy)]
+struct Plane {
+    point: Vec3,
+    /// Outward normal of the model's surface at the point.
+    axis: Vec3,
+    /// Normal of the sheet.
+    normal: Vec3,
 }
 
 /// All seams of a surface, sampled.
@@ -107,7 +124,7 @@ impl Sheets {
         preference: &mut [f32],
     ) {
         let s = separation.unit();
-        let planes: Vec<(Vec3, Vec3)> = self
+        let planes: Vec<Plane> = self
             .samples
             .iter()
             .filter_map(|sample| {
@@ -116,17 +133,21 @@ impl Sheets {
                     [other, right] if right == p && remains[usize::from(other)] => -1.0,
                     _ => return None,
                 };
-                Some((sample.point, sample.sheet_normal(towards, s)))
+                Some(Plane {
+                    point: sample.point,
+                    axis: sample.normal,
+                    normal: sample.sheet_normal(towards, s),
+                })
             })
             .collect();
-        let near = Buckets::over(planes.iter().map(|p| p.0), self.reach_mm);
+        let near = Buckets::over(planes.iter().map(|p| p.point), self.reach_mm);
         let shaped: Vec<Option<f32>> = self
             .feet
             .par_iter()
             .map(|&(n, foot)| {
                 let x = grid.band.position(n as usize);
                 let planes = near.around(foot).map(|k| planes[k as usize]);
-                let (value, nearest_mm) = mean_distance(planes, x, foot, self.reach_mm)?;
+                let (value, nearest_mm) = mean_distance(planes, x, self.reach_mm)?;
                 let far = ((nearest_mm / self.reach_mm - SURE) / (1.0 - SURE)).clamp(0.0, 1.0);
                 let otherwise = f64::from(preference[n as usize]);
                 let otherwise = otherwise.signum() * nearest_mm.max(otherwise.abs());
@@ -142,21 +163,16 @@ impl Sheets {
     }
 }
 
-/// Value of φ at `x`, whose nearest point of the surface is `foot`, and the distance from `foot` to the
-/// nearest sample, mm; `None` where no sample is within reach.
-fn mean_distance(
-    planes: impl Iterator<Item = (Vec3, Vec3)>,
-    x: Vec3,
-    foot: Vec3,
-    reach_mm: f64,
-) -> Option<(f64, f64)> {
+/// Value of φ at `x`, and the least distance r_k, mm; `None` where no sample is within reach.
+fn mean_distance(planes: impl Iterator<Item = Plane>, x: Vec3, reach_mm: f64) -> Option<(f64, f64)> {
     let (mut sum, mut weights, mut nearest_sq) = (0.0, 0.0, f64::INFINITY);
-    for (point, b) in planes {
-        let r_sq = point.distance_squared(foot);
+    for Plane { point, axis, normal } in planes {
+        let off = x - point;
+        let r_sq = off.reject_from_normalized(axis).length_squared();
         let inside = 1.0 - r_sq / (reach_mm * reach_mm);
         if inside > 0.0 {
-            let w = inside * inside / (r_sq + LEAST_MM * LEAST_MM).powi(2);
-            sum += w * b.dot(x - point);
+            let w = inside * inside / (r_sq + SOFT_MM * SOFT_MM).powi(2);
+            sum += w * normal.dot(off);
             weights += w;
             nearest_sq = nearest_sq.min(r_sq);
         }
@@ -191,33 +207,46 @@ fn sample_seam(seam: &shellock_surface::Seam) -> Vec<Sample> {
     let stations = seam.resample(n);
     let is_loop = seam.is_loop();
     let n_stations = stations.len();
-    let smoothed = |mut values: Vec<Vec3>| {
-        for _ in 0..SMOOTHING_ROUNDS {
-            let old = values.clone();
-            for (i, value) in values.iter_mut().enumerate() {
-                let (before, after) = neighbours(i, n_stations, is_loop);
-                *value = 0.5 * old[i] + 0.25 * (old[before] + old[after]);
-            }
-        }
-        values
-    };
+    let smoothed = |values: Vec<Vec3>| smooth(values, FRAME_ROUNDS, is_loop, 0);
     let normals = smoothed(stations.iter().map(|s| s.1.normalize_or_zero()).collect());
+    // The ends, where other seams meet this one, stay.
+    let fixed = usize::from(!is_loop);
+    let points = smooth(
+        stations.iter().map(|s| s.0).collect(),
+        LINE_ROUNDS,
+        is_loop,
+        fixed,
+    );
     let chords = (0..n_stations).map(|i| {
         let (before, after) = neighbours(i, n_stations, is_loop);
-        (stations[after].0 - stations[before].0).normalize_or_zero()
+        (points[after] - points[before]).normalize_or_zero()
     });
     let tangents = smoothed(chords.collect());
     (0..n_stations)
         .map(|i| {
             let tangent = tangents[i].normalize_or_zero();
             Sample {
-                point: stations[i].0,
+                point: points[i],
                 tangent,
                 normal: (normals[i] - normals[i].dot(tangent) * tangent).normalize_or_zero(),
                 sides: [seam.a, seam.b],
             }
         })
         .collect()
+}
+
+/// Averages all values along a seam with those before and after them, `rounds` times, except the first and
+/// the last `n_fixed`.
+fn smooth(mut values: Vec<Vec3>, rounds: usize, is_loop: bool, n_fixed: usize) -> Vec<Vec3> {
+    let n = values.len();
+    for _ in 0..rounds {
+        let old = values.clone();
+        for i in n_fixed..n.saturating_sub(n_fixed) {
+            let (before, after) = neighbours(i, n, is_loop);
+            values[i] = 0.5 * old[i] + 0.25 * (old[before] + old[after]);
+        }
+    }
+    values
 }
 
 /// Stations before and after station `i` of `n`; the first and the last of a loop are the same place.
@@ -307,16 +336,32 @@ mod tests {
 
     #[test]
     fn around_a_straight_seam_the_field_is_the_distance_to_its_sheet_at_any_depth() {
-        let planes: Vec<(Vec3, Vec3)> = (-20..=20)
-            .map(|i| (0.3 * f64::from(i) * Vec3::X, sample().sheet_normal(1.0, Vec3::Y)))
+        let planes: Vec<Plane> = (-20..=20)
+            .map(|i| Plane {
+                point: 0.3 * f64::from(i) * Vec3::X,
+                axis: Vec3::Z,
+                normal: sample().sheet_normal(1.0, Vec3::Y),
+            })
             .collect();
         for (y, depth) in [(0.0, 0.0), (0.4, 1.0), (-1.1, 2.0), (1.9, 0.3)] {
             let x = Vec3::new(0.17, y, -depth);
-            let foot = Vec3::new(0.17, y, 0.0);
-            let (value, nearest_mm) = mean_distance(planes.iter().copied(), x, foot, 2.8).unwrap();
+            let (value, nearest_mm) = mean_distance(planes.iter().copied(), x, 2.8).unwrap();
             assert!((value - y).abs() < 1e-9);
             assert!(nearest_mm >= y.abs() && nearest_mm < y.abs() + 0.15);
         }
-        assert!(mean_distance(planes.into_iter(), 9.0 * Vec3::Y, 9.0 * Vec3::Y, 2.8).is_none());
+        assert!(mean_distance(planes.into_iter(), 9.0 * Vec3::Y, 2.8).is_none());
+    }
+
+    /// A straight seam that turns at every triangle, by 0.2 mm every 0.9 mm.
+    #[test]
+    fn a_seam_that_turns_at_every_triangle_becomes_straight_and_keeps_its_ends() {
+        let zigzag: Vec<Vec3> = (0..=100i32)
+            .map(|i| Vec3::new(0.3 * f64::from(i), 0.2 * f64::from((i % 6 - 3).abs() - 1), 0.0))
+            .collect();
+        let line = smooth(zigzag.clone(), LINE_ROUNDS, false, 1);
+        assert_eq!((line[0], line[100]), (zigzag[0], zigzag[100]));
+        let inner = &line[10..91];
+        let mean = inner.iter().map(|p| p.y).sum::<f64>() / inner.len() as f64;
+        assert!(inner.iter().all(|p| (p.y - mean).abs() < 0.02), "{inner:?}");
     }
 }

@@ -14,8 +14,9 @@ const FROM_SIDE: f64 = 0.1;
 /// all. Points on a part's edge, which clearances round off, make up a tenth.
 const WHOLE: f64 = 0.9;
 const MOST: f64 = 0.5;
-/// Least width to which a half must be rooted in its wall, mm: two lines of a filament printer.
-const LEAST_ROOT_MM: f64 = 0.8;
+/// Least width to which a half should be rooted in its wall, mm, unless the whole half is narrower there. A
+/// tenth less ([`WHOLE`]) is the neck that the verification accepts.
+const LEAST_ROOT_MM: f64 = 0.95;
 /// Spacing of the points that are asked for a root, and their greatest distance from its middle, mm.
 const ROOT_STEP_MM: f64 = 0.2;
 const ROOT_BAND_MM: f64 = 0.1;
@@ -34,8 +35,20 @@ pub(super) struct Left {
     pub at: f64,
     /// Least share of any of its parts that is left.
     pub share: f64,
-    /// Width to which it is rooted in the wall, mm.
-    pub root_mm: f64,
+    /// Point of the seam at the section.
+    pub point: Vec3,
+    /// Root in the wall, if it has one.
+    pub root: Option<Root>,
+}
+
+/// Root of a half in its wall at one section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Root {
+    /// Width that carving left, and that of the whole half, mm.
+    pub width_mm: f64,
+    pub whole_mm: f64,
+    /// Middle of the root.
+    pub at: Vec3,
 }
 
 /// The wall that a half hangs from.
@@ -48,9 +61,9 @@ pub(super) struct Wall<'a> {
 }
 
 impl Wall<'_> {
-    /// Width to which the half `carved` is rooted in the wall at a station, mm: the length that both share of
-    /// a line shortly above the inner surface.
-    fn root_mm(&self, at: &RunStation, bounds: ProfileRect, carved: &Body) -> f64 {
+    /// Root of a half, `whole` and `carved`, in the wall at a station. Its width is the length that half and
+    /// wall share of a line shortly above the inner surface.
+    fn root(&self, at: &RunStation, bounds: ProfileRect, [whole, carved]: [&Body; 2]) -> Option<Root> {
         let middle_mm = self.thickness_mm - ROOT_DEPTH_MM;
         let is_near = |p: Vec3| {
             let depth_mm = (self.depth_mm)(p);
@@ -62,8 +75,20 @@ impl Wall<'_> {
         };
         let points = steps(bounds.n0, bounds.n1)
             .flat_map(|n| steps(bounds.s0, bounds.s1).map(move |s| at.place(n, s)));
-        let n = points.filter(|p| is_near(*p) && carved.holds(*p) && self.body.holds(*p));
-        n.count() as f64 * ROOT_STEP_MM.powi(2) / (2.0 * ROOT_BAND_MM)
+        let (mut n_whole, mut n, mut sum) = (0u32, 0u32, Vec3::ZERO);
+        for p in points.filter(|p| is_near(*p) && whole.holds(*p)) {
+            n_whole += 1;
+            if carved.holds(p) && self.body.holds(p) {
+                n += 1;
+                sum += p;
+            }
+        }
+        let width_mm = |n: u32| f64::from(n) * ROOT_STEP_MM.powi(2) / (2.0 * ROOT_BAND_MM);
+        (n > 0).then(|| Root {
+            width_mm: width_mm(n),
+            whole_mm: width_mm(n_whole),
+            at: sum / f64::from(n),
+        })
     }
 }
 
@@ -129,7 +154,8 @@ pub(super) fn sections_left(
             all.push(Left {
                 at: i as f64 + t,
                 share: shares.fold(1.0, f64::min),
-                root_mm: wall.root_mm(&station, bounds, &carved),
+                point: station.point,
+                root: wall.root(&station, bounds, [&whole, &carved]),
             });
         }
     }
@@ -170,12 +196,31 @@ pub(super) fn trimmed(run: &Run, left: [&[Left]; 2]) -> Option<Vec<Run>> {
 
 /// Share of each section that is left, and at most the share of the least root that its neighbourhood has.
 fn shares(left: &[Left]) -> Vec<f64> {
-    let root_mm = |i: usize| {
-        let around = &left[i.saturating_sub(ROOT_REACH)..(i + ROOT_REACH + 1).min(left.len())];
-        around.iter().map(|l| l.root_mm).sum::<f64>() / around.len() as f64
+    let roots: Vec<f64> = (0..left.len()).map(|i| root_share(left, i)).collect();
+    let mean = |i: usize| {
+        let around = &roots[i.saturating_sub(ROOT_REACH)..(i + ROOT_REACH + 1).min(left.len())];
+        around.iter().sum::<f64>() / around.len() as f64
     };
-    let share = |(i, left): (usize, &Left)| left.share.min(root_mm(i) / LEAST_ROOT_MM);
+    let share = |(i, left): (usize, &Left)| left.share.min(mean(i));
     left.iter().enumerate().map(share).collect()
+}
+
+/// Area of the root of section `i` for each mm of the run, as a share of the least one. Where sections fan
+/// out over a convex corner, their roots lie closer together than their stations.
+fn root_share(left: &[Left], i: usize) -> f64 {
+    let Some(root) = left[i].root else { return 0.0 };
+    let share = root.width_mm / LEAST_ROOT_MM.min(root.whole_mm);
+    let around = &left[i.saturating_sub(1)..(i + 2).min(left.len())];
+    let rooted: Vec<(Vec3, Vec3)> = around
+        .iter()
+        .filter_map(|l| Some((l.point, l.root?.at)))
+        .collect();
+    let ((from, root_from), (to, root_to)) = (rooted[0], rooted[rooted.len() - 1]);
+    let spacing_mm = from.distance(to);
+    if spacing_mm == 0.0 {
+        return share;
+    }
+    share * (root_from.distance(root_to) / spacing_mm).min(1.0)
 }
 
 /// The stretches of `run` on which at least `least` of each section is left.
@@ -316,7 +361,12 @@ mod tests {
         at.map(|at| Left {
             at,
             share: share(at),
-            root_mm: 1.0,
+            point: station_at(run, at).point,
+            root: Some(Root {
+                width_mm: 1.0,
+                whole_mm: 1.0,
+                at: station_at(run, at).point,
+            }),
         })
         .collect()
     }
@@ -346,6 +396,27 @@ mod tests {
         assert!(trimmed(&run, [&most, &most]).is_none());
         let gone = left(&run, |_| 0.1);
         assert_eq!(trimmed(&run, [&gone, &gone]).unwrap().len(), 0);
+    }
+
+    /// Sections that fan out around the end of an edge: roots of 1 mm, 0.5 mm from it, under stations 3 mm
+    /// from it.
+    #[test]
+    fn sections_that_fan_out_share_a_root() {
+        let at = |i: u32, radius_mm: f64| radius_mm * Vec3::X.rotate_z(f64::from(i) * 0.17);
+        let left: Vec<Left> = (0..10)
+            .map(|i| Left {
+                at: f64::from(i),
+                share: 1.0,
+                point: at(i, 3.0),
+                root: Some(Root {
+                    width_mm: 0.95,
+                    whole_mm: 2.0,
+                    at: at(i, 0.5),
+                }),
+            })
+            .collect();
+        assert!((0..10).all(|i| (root_share(&left, i) - 0.5 / 3.0).abs() < 0.01));
+        assert!(shares(&left).iter().all(|share| *share < MOST));
     }
 
     #[test]
@@ -396,9 +467,9 @@ mod tests {
             found
                 .iter()
                 .filter(|l| x(l) < 14.5)
-                .all(|l| (l.root_mm - 1.0).abs() < 0.25)
+                .all(|l| (l.root.unwrap().width_mm - 1.0).abs() < 0.25)
         );
-        assert!(found.iter().filter(|l| x(l) > 15.5).all(|l| l.root_mm == 0.0));
+        assert!(found.iter().filter(|l| x(l) > 15.5).all(|l| l.root.is_none()));
         let rooted = trimmed(&run, [&found, &found]).unwrap();
         assert!(rooted.len() == 1 && rooted[0].length() < 8.5);
     }
