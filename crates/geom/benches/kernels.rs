@@ -10,7 +10,7 @@ use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::simplify::simplify;
-use shellock_geom::sweep::Sweeper;
+use shellock_geom::sweep::{Draft, Sweeper};
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_testkit::shapes::contoured_ball;
 
