@@ -53,7 +53,8 @@ impl<'a> Sweeper<'a> {
     }
 
     /// Computes `max over t ≥ 0 of field(x + t·step)` at every node x. `step` has components in {−1, 0, 1},
-    /// not all 0. With a `draft`, values that lie ahead count for more.
+    /// not all 0. With a `draft` it is the smaller of two maxima: of `field + per_mm · way`, and of
+    /// `field + most_mm`.
     ///
     /// Off the band the field counts as −∞, so a line may leave the band and come back. Between nodes the
     /// trilinear interpolant is sampled at three inner points of each diagonal step.

@@ -26,7 +26,8 @@ const SKIN_CELLS: f64 = 1.5;
 /// rubbing.
 const MARGIN_CELLS: f64 = 0.1;
 /// Draft of all ways out. Contours of sampled fields are off by some hundredths of a mm, and a piece that
-/// slides along a wall without draft would rub on every bump. Without it relief cuts three times as much.
+/// slides along a wall without draft would rub on every bump. Without it relief cuts three times as much from
+/// a cat. With 0.2 mm at most, a way out that grazed a teddy's head cut 12 mm of its skin off.
 const DRAFT: Draft = Draft {
     per_mm: 0.08,
     most_mm: 0.12,

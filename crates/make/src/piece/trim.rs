@@ -44,8 +44,9 @@ pub(super) struct Left {
 /// Root of a half in its wall at one section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Root {
-    /// Width that carving left, and that of the whole half, mm.
+    /// Width that carving left, mm.
     pub width_mm: f64,
+    /// Width that the whole half would have, mm.
     pub whole_mm: f64,
     /// Middle of the root.
     pub at: Vec3,
@@ -398,8 +399,8 @@ mod tests {
         assert_eq!(trimmed(&run, [&gone, &gone]).unwrap().len(), 0);
     }
 
-    /// Sections that fan out around the end of an edge: roots of 1 mm, 0.5 mm from it, under stations 3 mm
-    /// from it.
+    /// Sections that fan out around the end of an edge: roots of the least width, 0.5 mm from it, under
+    /// stations 3 mm from it.
     #[test]
     fn sections_that_fan_out_share_a_root() {
         let at = |i: u32, radius_mm: f64| radius_mm * Vec3::X.rotate_z(f64::from(i) * 0.17);
