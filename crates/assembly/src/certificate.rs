@@ -253,9 +253,7 @@ pub fn certify(
         return None;
     }
     let (center, length_mm) = frame(pieces);
-    let mut claims: Vec<Claim> = claim_lock(plan, contacts, center, length_mm)
-        .into_iter()
-        .collect();
+    let mut claims: Vec<Claim> = claim_lock(plan, contacts, pieces).into_iter().collect();
     let contacts = keep_contacts(contacts, &mut claims);
     let (bearings, proven) = play.map_or_else(Default::default, list_bounds);
     claims.extend(proven.into_iter().map(Claim::Bounded));
@@ -301,7 +299,12 @@ fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
 }
 
 /// Claims the lock with its proof, if there is one: with the first piece held, only the key moves.
-fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, length_mm: f64) -> Option<Claim> {
+pub(crate) fn claim_lock(
+    plan: &InstallationPlan,
+    contacts: &[Contact],
+    pieces: &IdVec<PatchId, TriMesh>,
+) -> Option<Claim> {
+    let (center, length_mm) = frame(pieces);
     let centered: Vec<Contact> = contacts
         .iter()
         .map(|c| Contact {

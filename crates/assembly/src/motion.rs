@@ -2,19 +2,14 @@
 //!
 //! A motion gives each free piece a velocity (and a spin). A contact with normal `n` from `a` to `b` allows
 //! the motion if `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only
-//! solution.
-//!
-//! With `b = Aᵀ1 / m`, the least-norm point `r = b + Aᵀμ`, `μ ≥ 0`, decides everything (the alternatives of
-//! Stiemke). If `r = 0`, the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x = 0`
-//! and only a null space of `A` can move. Otherwise `x = −r` is a motion that opens contacts. For every
-//! motion with `|x| ≤ 1`, `−1ᵀA x ≤ m ‖r‖₁`, which bounds the linear program of an outside judge. `r` is
-//! found by non-negative least squares [LawsonHanson1974, ch. 23] on a Cholesky factor of the active
-//! contacts, which are never more than the unknowns.
+//! solution. Normals are rounded, so the contacts get a small gap `g`, and a linear program finds how far
+//! `A x ≤ g` lets pieces go: a few gaps, or without end.
 
 mod forces;
 mod play;
 mod system;
 
+pub(crate) use forces::Balance;
 use nalgebra::DVector;
 pub(crate) use play::{Corner, Limits};
 use rand::RngExt;
@@ -41,6 +36,13 @@ pub struct Contact {
     /// Area of `a` that the point represents, mm².
     pub area_mm2: f64,
 }
+
+/// Gap of all contacts while motions are sought, mm.
+const SLACK_MM: f64 = 0.1;
+/// Motion, as a multiple of the gap, above which pieces are loose. Kits of 15 models that hold move by 36 to
+/// 228 gaps. A pair of pieces that slides along walls moves by more than 10 000, though the walls are
+/// parallel to a few thousandths only.
+const MOST_GAPS: f64 = 500.0;
 
 /// Multiple of [`most_play`] from which a piece counts as loose.
 pub const LOOSE: f64 = 2.0;
@@ -129,8 +131,12 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
 /// Finds how the pieces not in `held` (of `n_pieces`) can move; empty if they cannot. With `leaves`, that
 /// piece may move freely, and only motions in which others move count.
 ///
-/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. Without contacts, all free
-/// pieces count as moving.
+/// `scale_mm` makes spins comparable to velocities: half the model's diagonal.
+///
+/// Every contact gets the gap [`SLACK_MM`]. Pieces that hold each other move by some gaps then. A group that
+/// slides along parallel walls moves without end, but for the rounding of their normals: without gaps, that
+/// rounding alone would hold it. Between the two, [`MOST_GAPS`] decides. A cone that is more than 0 in the
+/// others' unknowns is found along almost any direction or its opposite; three are tried.
 pub fn free_motion(
     contacts: &[Contact],
     n_pieces: usize,
@@ -143,36 +149,12 @@ pub fn free_motion(
         .map(PatchId::from)
         .filter(|id| !held.contains(id))
         .collect();
-    if free.is_empty() {
-        return Vec::new();
-    }
     let system = System::new(contacts, &free, scale_mm, freedom);
-    let motion = system.opening_motion().or_else(|| system.sliding_motion());
-    let Some(motion) = motion else { return Vec::new() };
-    let Some(leaves) = leaves else {
-        return system.twists(&motion, &free);
-    };
-    let without =
-        |twists: Vec<Twist>| -> Vec<Twist> { twists.into_iter().filter(|t| t.piece != leaves).collect() };
-    match moving_others(&system, &free, leaves) {
-        Some(motion) => without(system.twists(&motion, &free)),
-        None => Vec::new(),
-    }
-}
-
-/// Finds a motion in which pieces other than `leaves` move; `None` if there is none.
-///
-/// A cone that is more than 0 in their unknowns is found along almost any direction or its opposite; three
-/// are tried.
-fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<DVector<f64>> {
-    /// Least displacement that counts as a motion of others, of the 1000 mm at which motions end; gaps that
-    /// are 0 are taken as some nanometres.
-    const MOVED_MM: f64 = 0.5;
-    let limits = Limits::new(system, &vec![0.0; system.rows.len()]);
+    let width = system.n / free.len().max(1);
+    let is_other = |k: usize| Some(free[k / width]) != leaves;
+    let limits = Limits::new(&system, &vec![SLACK_MM; system.rows.len()]);
     let mut corner = Corner::new(&limits);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let width = system.n / free.len().max(1);
-    let is_other = |k: usize| free[k / width] != leaves;
     for _ in 0..3 {
         let towards = DVector::from_fn(system.n, |k, _| {
             if is_other(k) {
@@ -183,17 +165,16 @@ fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<D
         });
         for sign in [1.0, -1.0] {
             corner.farthest(&(&towards * sign));
-            let moved = (0..system.n)
-                .filter(|&k| is_other(k))
-                .map(|k| corner.motion()[k].abs())
-                .fold(0.0, f64::max);
-            if moved > MOVED_MM {
-                let of_others = |k: usize| if is_other(k) { corner.motion()[k] } else { 0.0 };
-                return Some(DVector::from_fn(system.n, |k, _| of_others(k)));
+            let motion = corner.motion();
+            let of_others = DVector::from_fn(system.n, |k, _| if is_other(k) { motion[k] } else { 0.0 });
+            if system.n > 0 && of_others.amax() > MOST_GAPS * SLACK_MM {
+                let mut moving = system.twists(&of_others, &free);
+                moving.retain(|t| Some(t.piece) != leaves);
+                return moving;
             }
         }
     }
-    None
+    Vec::new()
 }
 
 #[cfg(test)]
@@ -221,31 +202,8 @@ mod tests {
         contacts
     }
 
-    /// The outside judge's own program: the greatest total opening of the contacts, divided by their number.
-    fn opening_by_simplex(system: &System) -> f64 {
-        let mut base = DVector::zeros(system.n);
-        system.rows.iter().for_each(|row| system.add(row, 1.0, &mut base));
-        let mut problem = Problem::new(OptimizationDirection::Minimize);
-        let x: Vec<_> = base.iter().map(|&c| problem.add_var(c, (-1.0, 1.0))).collect();
-        for row in &system.rows {
-            let mut dense = DVector::zeros(system.n);
-            system.add(row, 1.0, &mut dense);
-            let terms: Vec<_> = x
-                .iter()
-                .copied()
-                .zip(dense.iter().copied())
-                .filter(|t| t.1 != 0.0)
-                .collect();
-            problem.add_constraint(&terms, ComparisonOp::Le, 0.0);
-        }
-        let SolveOutcome::Solution(best) = problem.solve().unwrap() else {
-            panic!("no limit was set")
-        };
-        -best.objective() / system.rows.len() as f64
-    }
-
     #[test]
-    fn opening_motions_exist_exactly_where_the_linear_program_finds_one() {
+    fn pieces_move_exactly_where_the_linear_program_of_touching_contacts_finds_a_motion() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let (mut n_locked, mut n_open) = (0, 0);
         for n in [5, 8, 10, 12, 13, 14, 16, 20, 24, 26, 28, 30, 34, 40, 60] {
@@ -253,20 +211,17 @@ mod tests {
                 let contacts = random_contacts(&mut rng, n_pieces, n);
                 let free: Vec<PatchId> = (1..n_pieces).map(PatchId).collect();
                 let system = System::new(&contacts, &free, 1.0, Freedom::Rigid);
-                let motion = system.opening_motion();
-                let opening = opening_by_simplex(&system);
-                assert_eq!(motion.is_some(), opening > 1e-6, "{n} contacts: {opening}");
-                if let Some(x) = &motion {
-                    n_open += 1;
-                    let worst = system
-                        .rows
-                        .iter()
-                        .map(|r| system.dot(r, x))
-                        .fold(f64::NEG_INFINITY, f64::max);
-                    assert!(worst <= 1e-5 * x.norm(), "violates a contact by {worst}");
-                } else {
-                    n_locked += 1;
-                }
+                let touching = vec![0.0; system.rows.len()];
+                let farthest = (0..4).map(|_| {
+                    let towards = DVector::from_fn(system.n, |_, _| rng.random::<f64>() - 0.5);
+                    farthest_by_simplex(&system, &touching, &towards)
+                });
+                let can_move = farthest.fold(0.0, f64::max) > 1.0;
+                let held = [PatchId(0)];
+                let moving = free_motion(&contacts, n_pieces as usize, &held, None, 1.0, Freedom::Rigid);
+                assert_eq!(!moving.is_empty(), can_move, "{n} contacts: {moving:?}");
+                n_open += usize::from(can_move);
+                n_locked += usize::from(!can_move);
             }
         }
         assert!(n_locked > 5 && n_open > 5, "{n_locked} locked, {n_open} open");
@@ -368,10 +323,34 @@ mod tests {
         contacts.retain(|c| c.normal != Vec3::X);
         let moving = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
         assert_eq!(moving.len(), 1);
-        assert!((moving[0].velocity - Vec3::X).length() < 1e-6);
+        assert!((moving[0].velocity - Vec3::X).length() < 1e-3, "{moving:?}");
         contacts.retain(|c| c.normal != Vec3::NEG_X);
         let sliding = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
         assert!(sliding[0].velocity.x.abs() > 0.999, "{sliding:?}");
+    }
+
+    #[test]
+    fn rounded_normals_do_not_hold_a_group_that_slides_out_with_the_key() {
+        // Pieces 1 and 2 are caged in piece 0, open towards +x, and by each other along x.
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut contacts = box_contacts(1, 0, Vec3::ZERO);
+        contacts.extend(box_contacts(2, 0, Vec3::X * 2.0));
+        contacts.retain(|c| c.normal.x == 0.0);
+        contacts.extend(box_contacts(1, 2, Vec3::ZERO));
+        let mut bumpy = || Vec3::new(rng.random(), rng.random(), rng.random()) * 0.002 - 0.001;
+        for c in &mut contacts {
+            c.normal = (c.normal + bumpy()).normalize();
+        }
+        for leaves in [None, Some(PatchId(2))] {
+            let moving = free_motion(&contacts, 3, &[PatchId(0)], leaves, 3.0, Freedom::Rigid);
+            assert!(
+                moving[0].piece == PatchId(1) && moving[0].velocity.x.abs() > 0.99,
+                "{moving:?}"
+            );
+        }
+        contacts.extend(box_contacts(1, 0, Vec3::ZERO));
+        let leaves = Some(PatchId(2));
+        assert!(free_motion(&contacts, 3, &[PatchId(0)], leaves, 3.0, Freedom::Rigid).is_empty());
     }
 
     #[test]

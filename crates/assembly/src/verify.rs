@@ -34,6 +34,7 @@ pub use thin::{ThinFeature, ThinKind, ThinShare, thin_places, thin_share};
 
 use crate::InstallationPlan;
 use crate::PressFit;
+use crate::certificate;
 use crate::motion::{self, Freedom, Twist};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -360,7 +361,12 @@ pub fn examine(
         ("nothing but the key moves (6 dof)", Freedom::Rigid),
     ] {
         ctx.check()?;
-        verdict.add(check_motion(name, plan, &contacts, 0.5 * length_mm, freedom));
+        let (check, finding) = check_motion(name, plan, &contacts, 0.5 * length_mm, freedom);
+        let check = match freedom {
+            Freedom::Translations => check,
+            Freedom::Rigid => with_proof(check, assembly, &contacts),
+        };
+        verdict.add((check, finding));
     }
     Ok((verdict, contacts))
 }
@@ -427,6 +433,17 @@ fn check_motion(
     let motions = || moving.iter().map(Motion::from).collect();
     let finding = (!moving.is_empty()).then(|| Finding::ClusterMoves { motions: motions() });
     (Check::new(name, moving.is_empty(), figure), finding)
+}
+
+/// Returns the check unless it passed and no proof of the lock is found: no motion was found then, but a
+/// certificate without that proof would be refused.
+fn with_proof(check: Check, assembly: &Assembly<'_>, contacts: &[Contact]) -> Check {
+    let is_proven = || certificate::claim_lock(assembly.plan, contacts, assembly.pieces).is_some();
+    if !check.ok || is_proven() {
+        return check;
+    }
+    let figure = format!("{}, but no proof is found", check.figure);
+    Check::new(&check.name, false, figure)
 }
 
 /// Rounds `x` to six decimals: no printer or judge resolves more, and the order in which threads add up does

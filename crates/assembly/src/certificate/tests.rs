@@ -168,7 +168,7 @@ fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
     assert!(!is_locked(&contacts, 2, Freedom::Rigid));
     let spin = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Rigid)[0];
     assert!(
-        spin.spin.x.abs() > 0.99 && spin.velocity.length() < 1e-6,
+        spin.spin.x.abs() > 0.99 && spin.velocity.length() < 1e-3,
         "{spin:?}"
     );
 }
@@ -289,6 +289,39 @@ fn no_subset_slides_out_of_what_is_certified_and_one_piece_slides_where_it_is_no
         n_locked > 12 && n_sliding > 12,
         "{n_locked} locked, {n_sliding} sliding"
     );
+}
+
+#[test]
+fn a_key_with_several_ways_out_locks_the_others() {
+    // Piece 1 is caged in piece 0 but towards +x, where the key, piece 2, blocks it. The key leaves along z;
+    // one flank is parallel to its way, the other sloping: it may move away from the former, too.
+    let mut contacts = Vec::new();
+    let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let mut face = |a: u32, b: u32, middle: Vec3, normal: Vec3| {
+        let (u, v) = normal.any_orthonormal_pair();
+        contacts.extend(corners.map(|(p, q)| contact(a, b, middle + p * u + q * v, normal)));
+    };
+    for normal in [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
+        face(1, 0, normal, normal);
+    }
+    face(1, 2, Vec3::X, Vec3::X);
+    let key = Vec3::X * 2.0;
+    let sloping = Vec3::new(0.0, -1.0, -0.1).normalize();
+    for normal in [Vec3::X, Vec3::Y, sloping] {
+        face(2, 0, key + normal, normal);
+    }
+    let leaves = Some((PatchId(2), Vec3::Z));
+    let question = question(3, 2.0, Freedom::Rigid);
+    let proof = prove(&contacts, &Question { leaves, ..question }).expect("only the key moves");
+    assert!(
+        proof.residual < 1e-9 && proof.hold > 1e-2,
+        "{} {}",
+        proof.residual,
+        proof.hold
+    );
+    // Without the key's back, the key lets piece 1 go.
+    contacts.retain(|c| c.a != PatchId(2) || c.normal != Vec3::X);
+    assert!(prove(&contacts, &Question { leaves, ..question }).is_none());
 }
 
 #[test]

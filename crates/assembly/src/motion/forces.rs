@@ -1,4 +1,5 @@
-//! Contact forces that balance a load as far as pushing can: non-negative least squares.
+//! Contact forces that balance a load as far as pushing can: non-negative least squares [LawsonHanson1974,
+//! ch. 23] on a Cholesky factor of the active contacts, which are never more than the unknowns.
 
 use nalgebra::DVector;
 
@@ -11,10 +12,6 @@ const INDEPENDENT: f64 = 1e-9;
 /// Rounds for each unknown before the search ends undecided, which counts as a motion. It guards against
 /// endless rounds due to rounding. The number that real assemblies need has not been measured.
 const ROUNDS: usize = 30;
-
-/// Mean opening speed of the contacts that counts as zero. The outside judge bounds the optimum of its
-/// program by 1e-6; ours is an upper bound of that optimum.
-const OPENING: f64 = 5e-7;
 
 /// Contact forces `μ ≥ 0`, and the rest of the load that they leave.
 pub(crate) struct Balance {
@@ -58,21 +55,6 @@ impl System {
             forces: active.rows.into_iter().zip(active.forces).collect(),
             rest,
         }
-    }
-
-    /// Finds a motion that opens contacts and closes none; `None` if there is none.
-    pub(super) fn opening_motion(&self) -> Option<DVector<f64>> {
-        let Balance { rest, .. } = self.balance(&self.mean(), OPENING);
-        (rest.lp_norm(1) > OPENING).then(|| -rest)
-    }
-
-    /// Mean of all rows, `Aᵀ1 / m`.
-    fn mean(&self) -> DVector<f64> {
-        let mut mean = DVector::zeros(self.n);
-        self.rows
-            .iter()
-            .for_each(|row| self.add(row, 1.0 / self.rows.len() as f64, &mut mean));
-        mean
     }
 
     /// Row along which `−rest` violates its contact most, relative to the row's length.

@@ -1,15 +1,12 @@
 //! Contacts as linear inequalities on velocities.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use shellock_geom::Vec3;
 
 use super::Contact;
 use super::{Freedom, Twist};
 use crate::PatchId;
 
-/// Least ratio of smallest to greatest eigenvalue of `AᵀA`, below which pieces can slide without opening a
-/// contact; the outside judge has 1e-7.
-const SLIDING: f64 = 1.5e-7;
 /// Share of the fastest component from which a piece counts as moving.
 const MOVES: f64 = 0.05;
 
@@ -109,14 +106,6 @@ impl System {
             }
         }
         gram
-    }
-
-    /// Finds a motion along which all contacts slide; `None` if there is none.
-    pub(super) fn sliding_motion(&self) -> Option<DVector<f64>> {
-        let eigen = SymmetricEigen::new(self.gram(self.rows.iter().map(|row| (row, 1.0))));
-        let least = eigen.eigenvalues.imin();
-        (eigen.eigenvalues[least] <= SLIDING * eigen.eigenvalues.max())
-            .then(|| eigen.eigenvectors.column(least).into_owned())
     }
 
     /// Motions of the pieces that move, scaled so that the fastest component of all is 1.
