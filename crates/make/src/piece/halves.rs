@@ -13,6 +13,9 @@ use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_ha
 
 /// Depth to which connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
+/// Distance that halves end inside their own wall, mm. Sides in one plane with the wall would meet it in
+/// slivers, folds and slots that are thinner than a hair.
+const INSET_MM: f32 = 0.03;
 /// Rounds of shortening runs. What one round leaves is whole, so the second only mends ends.
 const MOST_TRIMS: usize = 2;
 
@@ -241,10 +244,8 @@ impl<'a> Room<'a> {
         if whole.is_empty() {
             return whole;
         }
-        let (ceiling, depth) = (self.ceiling(), &self.grid.depth);
-        whole.intersect(&self.region(&whole, &|n| {
-            (self.side[n] - self.gap_mm[n]).min(depth[n] - ceiling)
-        }))
+        let roof = self.region(&whole, &|n| self.grid.depth[n] - self.ceiling());
+        whole.intersect(&roof).intersect(&self.beside(&whole))
     }
 
     /// Returns true if a tongue has room in its middle, on both sides of the seam.
@@ -267,9 +268,10 @@ impl<'a> Room<'a> {
     /// `clearance_mm` away from obstructions. From the wall of other pieces it keeps the same distance: below
     /// the wall by that much, or on the piece's own side of the cuts by the gap.
     ///
-    /// A body's edge along the inner end of a seam is sharp. The single field of obstructions rounds it off
-    /// by up to a third of a cell, more than the clearance. Two smooth fields, united after contouring, keep
-    /// the edge. (Filling the angle in one field instead removes the connectors of narrow cavities.)
+    /// A body's edge along the inner end of a seam is sharp, and so is the edge of a root. A single field
+    /// rounds edges off by up to a third of a cell, more than the clearance: a root would end before its wall
+    /// does, with a slot as thin as a hair beside it. Smooth fields, united and intersected after contouring,
+    /// keep the edges. (Filling the angle in one field instead removes the connectors of narrow cavities.)
     fn cut(&self, whole: &Volume) -> Volume {
         let region = |field: &dyn Fn(usize) -> f32| self.region(whole, field);
         let (ceiling, floor) = (self.ceiling(), self.grid.thickness_mm as f32 + self.clearance_mm);
@@ -280,10 +282,15 @@ impl<'a> Room<'a> {
             let below = ((depth[n] - floor) / cell).clamp(0.0, 1.0);
             self.gap_mm[n] + (self.clearance_mm - self.gap_mm[n]).max(0.0) * below
         };
-        let space = region(&|n| (depth[n] - ceiling).min(-self.keep_out[n] - away(n)));
+        let roof = region(&|n| depth[n] - ceiling);
+        let space = region(&|n| -self.keep_out[n] - away(n));
         let below = region(&|n| depth[n] - floor);
-        let beside = region(&|n| self.side[n] - self.gap_mm[n]);
-        let free = whole.intersect(&space);
-        free.intersect(&below.union(&beside))
+        let free = whole.intersect(&roof).intersect(&space);
+        free.intersect(&below.union(&self.beside(whole)))
+    }
+
+    /// The region around `whole` on the piece's own side of the cuts, a little within its wall.
+    fn beside(&self, whole: &Volume) -> Volume {
+        self.region(whole, &|n| self.side[n] - self.gap_mm[n] - INSET_MM)
     }
 }
