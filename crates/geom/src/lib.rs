@@ -10,6 +10,7 @@ pub mod check;
 pub mod clearance;
 pub mod contour;
 pub mod decimate;
+pub mod fold;
 pub mod grown;
 pub mod hollow;
 pub mod laplacian;

@@ -4,10 +4,13 @@
 //! [`decimate`] keeps a mean of squared distances small. Here the distance itself is measured afterwards,
 //! both ways, and the triangles around points that moved too far are restored.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
 use crate::decimate::decimate;
+use crate::fold::folded_faces;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
 
@@ -15,7 +18,11 @@ use crate::{Solid, TriMesh, Vec3};
 /// distance.
 const MEAN_SHARE: f64 = 0.4;
 /// Largest number of rounds of restoring points that moved too far.
-const MOST_ROUNDS: usize = 8;
+const MOST_ROUNDS: usize = 12;
+
+/// Number of rounds that restore only the triangle beside such a point. Later ones restore its neighbours,
+/// too: what lies beside a point may move it.
+const NARROW_ROUNDS: usize = 2;
 
 /// A solid with fewer triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,8 +39,8 @@ pub struct Simplified {
 /// `within_mm` of the other surface. Points between triangles of different `labels` (one per triangle, or
 /// `None`) stay in place.
 ///
-/// `None` if this distance cannot be kept, or if the surface would cross itself. The same on any number of
-/// threads.
+/// `None` if this distance cannot be kept, or if the surface would cross itself or fold where it did not
+/// before. Equal on any number of threads.
 pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option<Simplified> {
     let mesh = solid.mesh();
     let old = TriangleBvh::new(mesh);
@@ -41,17 +48,17 @@ pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option
     for point in labels.map(|l| points_between(mesh, l)).unwrap_or_default() {
         tolerance[point as usize] = 0.0;
     }
-    for _ in 0..MOST_ROUNDS {
+    for round in 0..MOST_ROUNDS {
         let few = decimate(mesh.clone(), &tolerance);
         let new = TriangleBvh::new(&few);
         let (mut away, of_old) = points_away(mesh, &new, within_mm);
         let (stray, of_new) = points_away(&few, &old, within_mm);
         away.extend(stray);
-        let crossed = if away.is_empty() {
-            crossing_faces(&few)
-        } else {
-            Vec::new()
-        };
+        let mut crossed = Vec::new();
+        if away.is_empty() {
+            crossed = crossing_faces(&few);
+            crossed.extend(new_folds(&few, &new, mesh, &old));
+        }
         if away.is_empty() && crossed.is_empty() {
             let nearest = |f: usize| old.nearest(few.face_center(f), f64::INFINITY).map(|n| n.face);
             let source_face: Option<Vec<u32>> =
@@ -71,11 +78,45 @@ pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option
         away.extend(crossed.iter().flat_map(corners_and_middle));
         let nearest = |at: Vec3| old.nearest(at, f64::INFINITY).map(|n| n.face);
         let beside: Vec<u32> = away.into_par_iter().filter_map(nearest).collect();
-        for v in beside.into_iter().flat_map(|f| mesh.triangles[f as usize]) {
-            tolerance[v as usize] = 0.0;
-        }
+        let n_rings = if round < NARROW_ROUNDS { 0 } else { 1 };
+        restore(&mut tolerance, mesh, &beside, n_rings);
     }
     None
+}
+
+/// Lets the corners of `faces` stay, and with `n_rings` those of as many rings of triangles around them.
+fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], n_rings: usize) {
+    let mut stays = vec![false; tolerance.len()];
+    for v in faces.iter().flat_map(|&f| mesh.triangles[f as usize]) {
+        stays[v as usize] = true;
+    }
+    for _ in 0..n_rings {
+        let inner = stays.clone();
+        for t in mesh
+            .triangles
+            .iter()
+            .filter(|t| t.iter().any(|&v| inner[v as usize]))
+        {
+            t.iter().for_each(|&v| stays[v as usize] = true);
+        }
+    }
+    for (tolerance, _) in tolerance.iter_mut().zip(&stays).filter(|(_, stays)| **stays) {
+        *tolerance = 0.0;
+    }
+}
+
+/// Returns the faces of `few` that fold, without those that lie where the former mesh folds as well.
+fn new_folds(few: &TriMesh, few_bvh: &TriangleBvh, mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
+    let mut folds = folded_faces(few, few_bvh);
+    if !folds.is_empty() {
+        let former: HashSet<u32> = folded_faces(mesh, bvh).into_iter().collect();
+        let nearest = |face: u32| {
+            bvh.nearest(few.face_center(face as usize), f64::INFINITY)
+                .map(|n| n.face)
+        };
+        folds.retain(|&face| !nearest(face).is_some_and(|f| former.contains(&f)));
+    }
+    folds
 }
 
 /// Points where triangles of different labels meet.
@@ -143,23 +184,33 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_nearer_than_the_distance_do_not_cross_afterwards() {
+    fn surfaces_nearer_than_the_distance_neither_cross_nor_fold_afterwards() {
+        // A ball in a shell, with a narrow gap between them.
         let ball = ball(20.0);
         let n_points = ball.mesh().points.len() as u32;
-        let mut shell = ball.mesh().clone();
-        shell
-            .points
-            .extend(ball.mesh().points.iter().map(|p| *p * (1.0 - 3e-3)));
-        let inside_out = |&[a, b, c]: &[u32; 3]| [a, c, b].map(|v| v + n_points);
-        shell
-            .triangles
-            .extend(ball.mesh().triangles.iter().map(inside_out));
-        let shell = Solid::new(shell).expect("a ball with a cavity");
-        let tolerance = vec![MEAN_SHARE * 0.1; shell.mesh().points.len()];
-        assert!(!crossing_faces(&decimate(shell.mesh().clone(), &tolerance)).is_empty());
-        let few = simplify(&shell, None, 0.1).expect("some of it is simple");
+        let mut both = TriMesh::default();
+        for (number, (scale, is_inside_out)) in [(1.0, false), (1.003, true), (1.25, false)]
+            .into_iter()
+            .enumerate()
+        {
+            let first = number as u32 * n_points;
+            both.points.extend(ball.mesh().points.iter().map(|p| *p * scale));
+            let turned = |&[a, b, c]: &[u32; 3]| if is_inside_out { [a, c, b] } else { [a, b, c] };
+            let triangles = ball.mesh().triangles.iter().map(turned);
+            both.triangles.extend(triangles.map(|t| t.map(|v| v + first)));
+        }
+        let both = Solid::new(both).expect("closed");
+        let folds = |mesh: &TriMesh| folded_faces(mesh, &TriangleBvh::new(mesh));
+        let careless = decimate(
+            both.mesh().clone(),
+            &vec![MEAN_SHARE * 0.1; both.mesh().points.len()],
+        );
+        assert!(!crossing_faces(&careless).is_empty());
+        assert!(folds(both.mesh()).is_empty() && !folds(&careless).is_empty());
+        let few = simplify(&both, None, 0.1).expect("some of it is simple");
         assert!(crossing_faces(few.solid.mesh()).is_empty());
-        assert!(few.solid.mesh().triangles.len() < shell.mesh().triangles.len());
+        assert!(folds(few.solid.mesh()).is_empty());
+        assert!(few.solid.mesh().triangles.len() < both.mesh().triangles.len());
     }
 
     #[test]

@@ -7,6 +7,7 @@ use shellock_assembly::motion::Contact;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
 use shellock_geom::rounding::{NotPrintable, printable_body};
+use shellock_geom::simplify::simplify;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
@@ -20,6 +21,8 @@ use super::ribs::{Seat, ribs};
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Run, contacts};
 
+/// Greatest distance of a finished piece's surface from the one made, mm: far below what a printer resolves.
+const NEAR_MM: f64 = 0.01;
 /// Distance of ribs from the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
 
@@ -273,7 +276,7 @@ fn make_printable(
                 .label
                 .as_ref()
                 .and_then(|params| label::cut(params, grid, plan.position(q) + 1, &piece));
-            let printable = |piece: &Volume| printable_body(&finish.turn.volume(piece));
+            let printable = |piece: &Volume| printable_body(&finish.turn.volume(&with_few_triangles(piece)));
             // A number matters less than a piece that can be written.
             let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
@@ -297,6 +300,14 @@ fn make_printable(
         );
     }
     Ok(meshes.into_iter().map(|made| made.0).collect())
+}
+
+/// The piece with fewer triangles, within [`NEAR_MM`]; the piece as it is if no other keeps that distance.
+fn with_few_triangles(piece: &Volume) -> Volume {
+    let solid = Solid::new(piece.to_mesh()).ok();
+    let few = solid.and_then(|solid| simplify(&solid, None, NEAR_MM));
+    let few = few.and_then(|few| Volume::from_closed_mesh(few.solid.mesh()).ok());
+    few.unwrap_or_else(|| piece.clone())
 }
 
 /// Warns of the pieces without a number.
