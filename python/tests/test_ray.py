@@ -18,8 +18,8 @@ import shellock_ray  # noqa: E402
 from shellock import _native  # noqa: E402
 
 PROGRAM = os.environ.get("SHELLOCK", "shellock")
-OPTIONS = {"size": "60mm", "time": 0, "method": "creases", "pieces": 5, "thickness": "2mm"}
-FIGURES = ["vase", "torus", "fish"]
+OPTIONS = {"size": "60mm", "time": 0, "method": "creases", "pieces": 4, "thickness": "2mm"}
+FIGURES = ["torus", "vase"]
 
 
 @pytest.fixture(scope="module")
@@ -73,14 +73,14 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(folder, cluster, tmp_pat
     killer.join()
     assert killed
     assert [r.model for r in records] == ["below/broken.stl"] + sorted(f"{f}.stl" for f in FIGURES)
-    assert sorted(model for model, _, _ in heard) == [r.model for r in records] and [n for _, n, _ in heard] == [1, 2, 3, 4]
+    assert sorted(model for model, _, _ in heard) == [r.model for r in records] and [n for _, n, _ in heard] == [1, 2, 3]
     arguments = [f"--{name}={value}" for name, value in OPTIONS.items()]
     batch = subprocess.run([PROGRAM, "batch", folder, "--out", tmp_path / "batch", "--quiet", *arguments], capture_output=True, text=True)
     assert batch.returncode == 1, batch.stderr
     theirs = {row["model"]: row["status"] for row in csv.DictReader((tmp_path / "batch" / "batch.csv").open())}
-    assert {r.model: r.status for r in records} == theirs and list(theirs.values()).count("verified") >= 2
+    assert {r.model: r.status for r in records} == theirs and list(theirs.values()).count("verified") == 2
     mine, theirs = files(tmp_path / "ray"), files(tmp_path / "batch")
-    assert mine.keys() == theirs.keys() and len(mine) > 30
+    assert mine.keys() == theirs.keys() and len(mine) > 20
     assert [name for name in mine if mine[name] != theirs[name]] == []
     # Again: nothing is made.
     again = shellock_ray.run(str(folder), str(tmp_path / "ray"), OPTIONS)
@@ -91,7 +91,7 @@ def test_an_object_store_has_the_same_files(folder, cluster, tmp_path):
     pytest.importorskip("fsspec")
     (tmp_path / "store").mkdir()
     records = shellock_ray.run(str(folder), f"file://{tmp_path}/store", OPTIONS)
-    assert [r.status for r in records].count("verified") >= 2
+    assert [r.status for r in records].count("verified") == 2
     assert (tmp_path / "store" / "batch.csv").is_file()
     assert {p.parent.name for p in (tmp_path / "store").rglob("plan.json")} == set(FIGURES)
 
@@ -113,7 +113,7 @@ def test_what_is_wrong_with_one_model_is_told_in_its_row(folder, cluster, tmp_pa
         (models / "secret.stl").write_bytes(b"")
         (models / "secret.stl").chmod(0)
         names.append("secret.stl")
-    records = shellock_ray.run(str(models), str(out), {**OPTIONS, "pieces": np.int64(5)})
+    records = shellock_ray.run(str(models), str(out), {**OPTIONS, "pieces": np.int64(4)})
     assert [r.model for r in records] == names
     assert [r.status for r in records] == ["refused", "verified"] + ["refused"] * (len(names) - 2) and all(r.said for r in records if r.status == "refused")
     assert (out / "batch.csv").is_file() and (out / "foreign" / "notes.txt").read_text() == "mine"

@@ -19,7 +19,7 @@ import pytest
 import shellock
 
 PROGRAM = os.environ.get("SHELLOCK", "shellock")
-FAST = {"size": "70mm", "time": 0, "method": "creases", "pieces": 5, "thickness": "2mm"}
+FAST = {"size": "60mm", "time": 0, "method": "creases", "pieces": 4, "thickness": "2mm"}
 
 
 def program(*arguments, cwd, check=True):
@@ -63,7 +63,7 @@ def ball(n=24, radius=30.0):
 def vase(tmp_path_factory):
     """The program's own figure, as arrays."""
     folder = tmp_path_factory.mktemp("vase")
-    program("figure", "vase", "--out", "vase.stl", "--size", "70", cwd=folder)
+    program("figure", "vase", "--out", "vase.stl", "--size", "60", cwd=folder)
     raw = np.fromfile(folder / "vase.stl", dtype=np.uint8)[84:].reshape(-1, 50)
     corners = raw[:, 12:48].copy().view("<f4").reshape(-1, 3).astype(float)
     points, index = np.unique(corners, axis=0, return_inverse=True)
