@@ -36,16 +36,15 @@ pub struct Simplified {
 }
 
 /// Simplifies `solid` by collapsing edges. Points and triangle centres of both surfaces stay within
-/// `within_mm` of the other surface. Points between triangles of different `labels` (one per triangle, or
-/// `None`) stay in place.
+/// `within_mm` of the other surface. The points `fixed`, by their indices, stay in place.
 ///
 /// `None` if this distance cannot be kept, or if the surface would cross itself or fold where it did not
 /// before. Equal on any number of threads.
-pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option<Simplified> {
+pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplified> {
     let mesh = solid.mesh();
     let old = TriangleBvh::new(mesh);
     let mut tolerance = vec![MEAN_SHARE * within_mm; mesh.points.len()];
-    for point in labels.map(|l| points_between(mesh, l)).unwrap_or_default() {
+    for &point in fixed {
         tolerance[point as usize] = 0.0;
     }
     for round in 0..MOST_ROUNDS {
@@ -119,8 +118,8 @@ fn new_folds(few: &TriMesh, few_bvh: &TriangleBvh, mesh: &TriMesh, bvh: &Triangl
     folds
 }
 
-/// Points where triangles of different labels meet.
-fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
+/// Returns the points where triangles of different `labels`, one per triangle, meet.
+pub fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
     let mut seen: Vec<Option<i64>> = vec![None; mesh.points.len()];
     let mut between = Vec::new();
     for (t, &label) in mesh.triangles.iter().zip(labels) {
@@ -176,7 +175,7 @@ mod tests {
     #[test]
     fn no_point_is_farther_than_said() {
         let solid = ball(20.0);
-        let few = simplify(&solid, None, 0.05).expect("a ball is simple");
+        let few = simplify(&solid, &[], 0.05).expect("a ball is simple");
         assert!(2 * few.solid.mesh().triangles.len() < solid.mesh().triangles.len());
         assert!(farthest(solid.mesh(), few.solid.mesh()) <= 0.05);
         assert!(farthest(few.solid.mesh(), solid.mesh()) <= 0.05);
@@ -207,7 +206,7 @@ mod tests {
         );
         assert!(!crossing_faces(&careless).is_empty());
         assert!(folds(both.mesh()).is_empty() && !folds(&careless).is_empty());
-        let few = simplify(&both, None, 0.1).expect("some of it is simple");
+        let few = simplify(&both, &[], 0.1).expect("some of it is simple");
         assert!(crossing_faces(few.solid.mesh()).is_empty());
         assert!(folds(few.solid.mesh()).is_empty());
         assert!(few.solid.mesh().triangles.len() < both.mesh().triangles.len());
@@ -219,7 +218,7 @@ mod tests {
         let mesh = solid.mesh();
         let label = |mesh: &TriMesh, f: usize| i64::from(mesh.face_center(f).x > 0.3);
         let labels: Vec<i64> = (0..mesh.triangles.len()).map(|f| label(mesh, f)).collect();
-        let few = simplify(&solid, Some(&labels), 0.05).expect("a ball is simple");
+        let few = simplify(&solid, &points_between(mesh, &labels), 0.05).expect("a ball is simple");
         let after: Vec<i64> = few.source_face.iter().map(|&f| labels[f as usize]).collect();
         let border = |mesh: &TriMesh, labels: &[i64]| {
             let mut points: Vec<[i64; 3]> = points_between(mesh, labels)

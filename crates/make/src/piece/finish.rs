@@ -23,6 +23,8 @@ use crate::connector::{ConnectorParams, Run, contacts};
 
 /// Greatest distance of a finished piece's surface from the one made, mm: far below what a printer resolves.
 const NEAR_MM: f64 = 0.01;
+/// Depth below the model's surface up to which a piece's points stay in place, mm: it is seen.
+const VISIBLE_MM: f64 = 0.3;
 /// Distance of ribs from the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
 
@@ -276,7 +278,8 @@ fn make_printable(
                 .label
                 .as_ref()
                 .and_then(|params| label::cut(params, grid, plan.position(q) + 1, &piece));
-            let printable = |piece: &Volume| printable_body(&finish.turn.volume(&with_few_triangles(piece)));
+            let printable =
+                |piece: &Volume| printable_body(&finish.turn.volume(&with_few_triangles(piece, grid)));
             // A number matters less than a piece that can be written.
             let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
@@ -302,10 +305,21 @@ fn make_printable(
     Ok(meshes.into_iter().map(|made| made.0).collect())
 }
 
-/// The piece with fewer triangles, within [`NEAR_MM`]; the piece as it is if no other keeps that distance.
-fn with_few_triangles(piece: &Volume) -> Volume {
-    let solid = Solid::new(piece.to_mesh()).ok();
-    let few = solid.and_then(|solid| simplify(&solid, None, NEAR_MM));
+/// The piece with fewer triangles, within [`NEAR_MM`], except on and just below the model's surface. Returns
+/// the piece as it is if no other keeps that distance.
+fn with_few_triangles(piece: &Volume, grid: &ShellGrid) -> Volume {
+    let few = Solid::new(piece.to_mesh()).ok().and_then(|solid| {
+        let is_visible = |&p: &Vec3| {
+            grid.band
+                .sample(&grid.depth, p)
+                .is_some_and(|depth| depth < VISIBLE_MM)
+        };
+        let points = &solid.mesh().points;
+        let fixed: Vec<u32> = (0..points.len() as u32)
+            .filter(|&v| is_visible(&points[v as usize]))
+            .collect();
+        simplify(&solid, &fixed, NEAR_MM)
+    });
     let few = few.and_then(|few| Volume::from_closed_mesh(few.solid.mesh()).ok());
     few.unwrap_or_else(|| piece.clone())
 }
