@@ -9,7 +9,6 @@
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 
 mod bounded;
-mod proof;
 #[cfg(test)]
 mod tests;
 
@@ -17,13 +16,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use bounded::list_bounds;
 pub use bounded::{BearingPoint, Bounded};
-use proof::{LockProof, Question, prove};
 use serde::{Deserialize, Serialize};
-use shellock_geom::{Aabb, TriMesh, Vec3};
+use shellock_geom::{TriMesh, Vec3};
 
 use crate::InstallationPlan;
 use crate::PressFit;
-use crate::motion::Freedom;
+use crate::motion::proof::{LockProof, frame, prove_lock};
 use crate::play::{KitPlay, Slide};
 use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
@@ -288,51 +286,20 @@ pub fn certify(
     })
 }
 
-/// Centre of all pieces and half their diagonal, mm: the point that twists are about, and the distance at
-/// which spins count.
-fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
-    let bounds = pieces
-        .as_slice()
-        .iter()
-        .fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
-    (bounds.center(), 0.5 * bounds.diagonal())
-}
-
 /// Claims the lock with its proof, if there is one: with the first piece held, only the key moves.
-pub(crate) fn claim_lock(
+fn claim_lock(
     plan: &InstallationPlan,
     contacts: &[Contact],
     pieces: &IdVec<PatchId, TriMesh>,
 ) -> Option<Claim> {
-    let (center, length_mm) = frame(pieces);
-    let centered: Vec<Contact> = contacts
-        .iter()
-        .map(|c| Contact {
-            point: c.point - center,
-            ..*c
-        })
-        .collect();
-    let (held, key) = (vec![plan.steps[0].piece], plan.key());
-    let leaves = Some((key, plan.separation(key).unit()));
-    let freedom = Freedom::Rigid;
-    let proof = prove(
-        &centered,
-        &Question {
-            n_pieces: plan.steps.len(),
-            at_rest: &held,
-            leaves,
-            length_mm,
-            freedom,
-        },
-    )?;
     let LockProof {
         multipliers,
         residual,
         hold,
-    } = proof;
+    } = prove_lock(plan, contacts, pieces)?;
     Some(Claim::Locked {
-        held,
-        leaves: key,
+        held: vec![plan.steps[0].piece],
+        leaves: plan.key(),
         multipliers,
         residual,
         hold,

@@ -7,9 +7,10 @@
 
 mod forces;
 mod play;
+pub(crate) mod proof;
 mod system;
 
-pub(crate) use forces::Balance;
+use forces::Balance;
 use nalgebra::DVector;
 pub(crate) use play::{Corner, Limits};
 use rand::RngExt;

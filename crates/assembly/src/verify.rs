@@ -34,7 +34,7 @@ pub use thin::{ThinFeature, ThinKind, ThinShare, thin_places, thin_share};
 
 use crate::InstallationPlan;
 use crate::PressFit;
-use crate::certificate;
+use crate::motion::proof::prove_lock;
 use crate::motion::{self, Freedom, Twist};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -438,7 +438,7 @@ fn check_motion(
 /// Returns the check unless it passed and no proof of the lock is found: no motion was found then, but a
 /// certificate without that proof would be refused.
 fn with_proof(check: Check, assembly: &Assembly<'_>, contacts: &[Contact]) -> Check {
-    let is_proven = || certificate::claim_lock(assembly.plan, contacts, assembly.pieces).is_some();
+    let is_proven = || prove_lock(assembly.plan, contacts, assembly.pieces).is_some();
     if !check.ok || is_proven() {
         return check;
     }

@@ -6,10 +6,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::{Vec3, Volume};
 
-use super::proof::Question;
 use super::*;
 use crate::LatticeDirection;
-use crate::motion::free_motion;
+use crate::motion::proof::{Question, prove};
+use crate::motion::{Freedom, free_motion};
 use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, brick, grown, pinned_kit, pinned_lid};
 
 fn make_certificate(kit: &Kit) -> Certificate {

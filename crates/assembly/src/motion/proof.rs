@@ -33,11 +33,10 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
-use shellock_geom::Vec3;
+use shellock_geom::{Aabb, TriMesh, Vec3};
 
-use crate::PatchId;
-use crate::motion::{Balance, Freedom, Row, System};
-use crate::verify::contact::Contact;
+use super::{Balance, Contact, Freedom, Row, System};
+use crate::{IdVec, InstallationPlan, PatchId};
 
 /// Residual of a load, as the sum of its components, from which refinement starts.
 const BALANCED: f64 = 1e-10;
@@ -57,7 +56,7 @@ const OPENED: f64 = 1e-6;
 const CORRECTIONS: usize = 4;
 
 /// Multipliers which prove that contacts allow no motion.
-pub(super) struct LockProof {
+pub(crate) struct LockProof {
     /// Contacts with their multipliers, all positive; in the order of the contacts.
     pub multipliers: Vec<(usize, f64)>,
     /// Residual of the equilibrium, `|Aᵀμ|`.
@@ -68,7 +67,7 @@ pub(super) struct LockProof {
 
 /// Question for a proof: the pieces that may move.
 #[derive(Clone, Copy)]
-pub(super) struct Question<'a> {
+pub(crate) struct Question<'a> {
     /// Number of all pieces.
     pub n_pieces: usize,
     /// Pieces that do not move.
@@ -80,8 +79,43 @@ pub(super) struct Question<'a> {
     pub freedom: Freedom,
 }
 
+/// Centre of all pieces and half their diagonal, mm: the point that twists are about, and the distance at
+/// which spins count.
+pub(crate) fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
+    let bounds = pieces
+        .as_slice()
+        .iter()
+        .fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
+    (bounds.center(), 0.5 * bounds.diagonal())
+}
+
+/// Proves that only the key moves while the first piece rests; `None` if there is no proof.
+pub(crate) fn prove_lock(
+    plan: &InstallationPlan,
+    contacts: &[Contact],
+    pieces: &IdVec<PatchId, TriMesh>,
+) -> Option<LockProof> {
+    let (center, length_mm) = frame(pieces);
+    let centered: Vec<Contact> = contacts
+        .iter()
+        .map(|c| Contact {
+            point: c.point - center,
+            ..*c
+        })
+        .collect();
+    let key = plan.key();
+    let question = Question {
+        n_pieces: plan.steps.len(),
+        at_rest: &[plan.steps[0].piece],
+        leaves: Some((key, plan.separation(key).unit())),
+        length_mm,
+        freedom: Freedom::Rigid,
+    };
+    prove(&centered, &question)
+}
+
 /// Proves that no piece moves except the one that may leave; `None` if there is no proof.
-pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<LockProof> {
+pub(crate) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<LockProof> {
     let Question {
         n_pieces,
         at_rest: held,
