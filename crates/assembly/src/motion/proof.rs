@@ -35,7 +35,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-use super::{Balance, Contact, Freedom, Row, System};
+use super::{Balance, Contact, Freedom, Row, System, centered};
 use crate::{IdVec, InstallationPlan, PatchId};
 
 /// Residual of a load, as the sum of its components, from which refinement starts.
@@ -96,13 +96,6 @@ pub(crate) fn prove_lock(
     pieces: &IdVec<PatchId, TriMesh>,
 ) -> Option<LockProof> {
     let (center, length_mm) = frame(pieces);
-    let centered: Vec<Contact> = contacts
-        .iter()
-        .map(|c| Contact {
-            point: c.point - center,
-            ..*c
-        })
-        .collect();
     let key = plan.key();
     let question = Question {
         n_pieces: plan.steps.len(),
@@ -111,7 +104,7 @@ pub(crate) fn prove_lock(
         length_mm,
         freedom: Freedom::Rigid,
     };
-    prove(&centered, &question)
+    prove(&centered(contacts, center), &question)
 }
 
 /// Proves that no piece moves except the one that may leave; `None` if there is no proof.
