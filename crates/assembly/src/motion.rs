@@ -137,10 +137,10 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
 ///
 /// `scale_mm` makes spins comparable to velocities: half the model's diagonal.
 ///
-/// Every contact gets the gap [`SLACK_MM`]. Pieces that hold each other move by some gaps then. A group that
+/// Every contact gets a gap of 0.1 mm. Pieces that hold each other move by some gaps then. A group that
 /// slides along parallel walls moves without end, but for the rounding of their normals: without gaps, that
-/// rounding alone would hold it. Between the two, [`MOST_GAPS`] decides. A cone that is more than 0 in the
-/// others' unknowns is found along almost any direction or its opposite; three are tried.
+/// rounding alone would hold it. A group is loose if it moves by more than 500 gaps. A cone that is more than
+/// 0 in the others' unknowns is found along almost any direction or its opposite; three are tried.
 pub fn free_motion(
     contacts: &[Contact],
     n_pieces: usize,
