@@ -14,12 +14,12 @@
 //! ```
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by
-//! construction. A fragment that a cut leaves on one side is given to the other side (`fragments`). The piece
-//! then keeps out of the way of the fragments it gave, and takes along all that is ahead of those it got.
-//! Fragments smaller than the grid resolves can still break off a body; they go to the neighbouring body
-//! (`chips`). The two sides of a cut keep a small gap of constant width, from the inner side to the outer
-//! rim. Where outer patches hide each other a little, only the seam shifts. The first-installed piece is the
-//! remainder.
+//! construction. Minima and maxima are rounded where two fields are about equal. A fragment that a cut
+//! leaves on one side is given to the other side (`fragments`). The piece then keeps out of the way of the
+//! fragments it gave, and takes along all that is ahead of those it got. Fragments smaller than the grid
+//! resolves can still break off a body; they go to the neighbouring body (`chips`). The two sides of a cut
+//! keep a small gap of constant width, from the inner side to the outer rim. Where outer patches hide each
+//! other a little, only the seam shifts. The first-installed piece is the remainder.
 
 mod cache;
 mod chips;

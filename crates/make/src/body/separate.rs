@@ -32,6 +32,9 @@ const DRAFT: Draft = Draft {
     per_mm: 0.08,
     most_mm: 0.12,
 };
+/// Width of the transition between two fields of a cut, in cells. Contours step along an edge between fields,
+/// since the grid does not resolve it, and rims would show that.
+const BLEND_CELLS: f64 = 0.5;
 /// Distance from the key's cut within which a node counts as part of its seam, mm.
 const KEY_REACH_MM: f32 = 1.5;
 /// Limits to the simplification of cutting tools. Where they cut, at most this share of the gap and this many
@@ -361,6 +364,13 @@ impl Splitter<'_> {
     }
 }
 
+/// The greater of two field values. Values that differ by less than `width` blend into each other, and the
+/// result exceeds both by up to a quarter of it.
+fn smooth_max(a: f32, b: f32, width: f32) -> f32 {
+    let near = (width - (a - b).abs()).max(0.0);
+    a.max(b) + 0.25 * near * near / width
+}
+
 /// Distance by which each side of a cut stays back at node `n`, mm. The key's seams can have a gap of their
 /// own.
 fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
@@ -422,14 +432,16 @@ impl<'a> Separation<'a> {
             .map(|n| at(n, phi[n]).min(skin_mm - self.grid.depth[n]).max(-cutoff))
             .collect();
         let ahead_of_skin = self.sweeper.max_ahead(&skin, along.map(|x| -x), DRAFT);
+        let blend_mm = BLEND_CELLS as f32 * cell;
+        let leaving = |n: usize| smooth_max(phi[n], ahead_of_skin[n], blend_mm);
         let staying: Vec<f32> = (0..phi.len())
             .into_par_iter()
-            .map(|n| (at(n, -phi[n]).min(-ahead_of_skin[n]) + margin).max(-cutoff))
+            .map(|n| (at(n, -leaving(n)) + margin).max(-cutoff))
             .collect();
         let behind_staying = self.sweeper.max_ahead(&staying, along, DRAFT);
         let mut g: Vec<f32> = (0..phi.len())
             .into_par_iter()
-            .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
+            .map(|n| -smooth_max(-leaving(n), behind_staying[n], blend_mm))
             .collect();
         // Fragments that p gives stay, so p must keep out of their way as well. Fragments that p gets leave
         // together with all that is ahead of them.
@@ -451,7 +463,8 @@ impl<'a> Separation<'a> {
                 .into_par_iter()
                 .map(|n| at(n, -g[n]).max(-cutoff))
                 .collect();
-            let behind = self.sweeper.max_ahead(&staying, along, DRAFT);
+            // The cut has its draft, and another one each round would move it by that much.
+            let behind = self.sweeper.max_ahead(&staying, along, Draft::NONE);
             g.par_iter_mut()
                 .zip(&behind)
                 .for_each(|(g, behind)| *g = g.min(-behind));
