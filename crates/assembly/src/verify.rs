@@ -330,7 +330,7 @@ pub fn examine(
     let mut verdict = Verification::default();
     verdict.add(check_plan(pieces, plan));
     let is_plan = verdict.has_passed();
-    let bodies = body::read(ctx, pieces)?;
+    let bodies = body::read(ctx, pieces, model.map(Solid::mesh))?;
     let (checks, findings) = body::check(&bodies);
     verdict.checks.extend(checks);
     verdict.findings.extend(findings);

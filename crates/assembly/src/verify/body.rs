@@ -36,12 +36,16 @@ struct EdgeUse {
     non_manifold: Option<(usize, Vec3)>,
 }
 
-/// Reads all pieces and examines them one by one.
-pub fn read(ctx: &Ctx, pieces: &IdVec<PatchId, TriMesh>) -> Result<IdVec<PatchId, Body>, Cancelled> {
+/// Reads all pieces of a `model` and examines them one by one.
+pub fn read(
+    ctx: &Ctx,
+    pieces: &IdVec<PatchId, TriMesh>,
+    model: Option<&TriMesh>,
+) -> Result<IdVec<PatchId, Body>, Cancelled> {
     let ids: Vec<PatchId> = pieces.ids().collect();
     let read = ids.into_par_iter().map(|piece| {
         ctx.check()?;
-        Ok(read_piece(piece, &pieces[piece]))
+        Ok(read_piece(piece, &pieces[piece], model))
     });
     Ok(read
         .collect::<Result<Vec<Body>, Cancelled>>()?
@@ -82,7 +86,7 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
     (checks, findings)
 }
 
-fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
+fn read_piece(piece: PatchId, mesh: &TriMesh, model: Option<&TriMesh>) -> Body {
     let mut defects = Vec::new();
     let mesh = finite(mesh).map(merge_points).unwrap_or_default();
     let edges = edge_use(&mesh);
@@ -121,7 +125,7 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
         });
     }
     if volume.is_some() {
-        defects.extend(largest_part(piece, &mesh));
+        defects.extend(largest_part(piece, &mesh, model));
     }
     Body {
         mesh,
@@ -225,7 +229,7 @@ mod tests {
 
     #[test]
     fn each_defect_of_a_piece_is_found() {
-        let found = |mesh: &TriMesh| read_piece(PatchId(3), mesh).defects;
+        let found = |mesh: &TriMesh| read_piece(PatchId(3), mesh, None).defects;
         let cube = cuboid([0.0; 3], [2.0; 3]).to_mesh();
         assert!(found(&cube).is_empty());
 
@@ -262,6 +266,6 @@ mod tests {
     #[test]
     fn a_cavity_is_no_second_body() {
         let hollow = cuboid([0.0; 3], [4.0; 3]).subtract(&cuboid([1.0; 3], [3.0; 3]));
-        assert_eq!(read_piece(PatchId(0), &hollow.to_mesh()).defects, []);
+        assert_eq!(read_piece(PatchId(0), &hollow.to_mesh(), None).defects, []);
     }
 }

@@ -13,12 +13,12 @@ const VOXEL_SHARE: f64 = 1.0 / 6.0;
 /// Finds the largest part of a closed `mesh` that hangs on a thin neck.
 ///
 /// Necks are thinner than the mean wall of the piece, twice its volume over its area, so that the wall itself
-/// is none.
-pub fn largest_part(piece: PatchId, mesh: &TriMesh) -> Option<Finding> {
+/// is none. A neck of the `model` itself does not count: no division avoids it.
+pub fn largest_part(piece: PatchId, mesh: &TriMesh, model: Option<&TriMesh>) -> Option<Finding> {
     let wall_mm = 2.0 * mesh.signed_volume() / mesh.area();
     let mut found = NECKS.into_iter().filter_map(|(neck_mm, part_mm3)| {
         let width_mm = neck_mm.min(NECK_WALLS * wall_mm);
-        let parts = hanging_parts(mesh, width_mm, VOXEL_SHARE * width_mm, part_mm3);
+        let parts = hanging_parts(mesh, model, width_mm, VOXEL_SHARE * width_mm, part_mm3);
         parts.first().map(|part| Finding::Hanging {
             piece,
             volume_mm3: part.core_mm3,
@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn a_plate_on_a_narrow_bar_hangs_and_one_on_a_wide_bar_or_a_thin_wall_does_not() {
-        let width = |wall_mm, bar_mm| match largest_part(PatchId(2), &plates(wall_mm, bar_mm)) {
+        let width = |wall_mm, bar_mm| match largest_part(PatchId(2), &plates(wall_mm, bar_mm), None) {
             Some(Finding::Hanging { width_mm, .. }) => Some(width_mm),
             _ => None,
         };
