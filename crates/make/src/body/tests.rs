@@ -1,7 +1,7 @@
 use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_plan::{LatticePlan, LatticeStep};
-use shellock_report::{Ctx, IdVec};
+use shellock_report::{Ctx, IdVec, PatchId};
 use shellock_surface::SegmentedSurface;
 use shellock_test_surfaces::{label, sphere};
 
@@ -47,7 +47,7 @@ fn make_bodies(
 
 /// Asserts that every piece leaves what was installed before it, along its direction, with less than
 /// `most_mm3` of overlap.
-fn assert_leave_freely(bodies: &IdVec<shellock_report::PatchId, Volume>, plan: &LatticePlan, most_mm3: f64) {
+fn assert_leave_freely(bodies: &IdVec<PatchId, Volume>, plan: &LatticePlan, most_mm3: f64) {
     for (at, step) in plan.steps.iter().enumerate().skip(1) {
         for travel_mm in [0.0, 0.3, 1.0, 3.0, 8.0] {
             let moved = bodies[step.piece].translate(travel_mm * step.separation.unit());
@@ -106,17 +106,22 @@ fn cut_faces_stand_straight_under_their_seams_at_the_gap_from_them() {
     );
 }
 
-#[test]
-fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
-    let (mut surface, plan) = octants();
-    // An island of the key in the first-installed octant, too small to be more than a fragment.
-    let island = Vec3::splat(-1.0).normalize();
+/// Gives a patch an island around a point of another octant, too small to be more than a fragment.
+fn add_island(surface: &mut SegmentedSurface, patch: PatchId, around: Vec3) {
+    let island = around.normalize();
     let is_island = |f: usize| surface.mesh.face_center(f).normalize().dot(island) > 0.97;
     let faces: Vec<usize> = (0..surface.mesh.triangles.len())
         .filter(|&f| is_island(f))
         .collect();
-    faces.iter().for_each(|&f| surface.patch_of_face[f] = plan.key());
+    faces.iter().for_each(|&f| surface.patch_of_face[f] = patch);
     assert!(faces.len() > 20);
+}
+
+#[test]
+fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
+    let (mut surface, plan) = octants();
+    // The island lies in the first-installed octant.
+    add_island(&mut surface, plan.key(), Vec3::splat(-1.0));
     let (_, built) = make_bodies(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     assert!(bodies.as_slice().iter().all(|b| b.components().len() == 1));
@@ -124,6 +129,25 @@ fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
     // carving shifts.
     assert!(bodies[plan.steps[0].piece].volume() > 0.8 * bodies[plan.steps[3].piece].volume());
     assert_leave_freely(&bodies, &plan, 0.05);
+}
+
+#[test]
+fn a_cut_along_the_way_out_takes_one_draft_although_fragments_change_sides() {
+    const GAP_AND_DRAFT_MM: f64 = 0.05 + 0.12;
+    let (mut surface, mut plan) = octants();
+    add_island(&mut surface, plan.steps[0].piece, Vec3::new(2.0, 1.0, 1.0));
+    let key = plan.steps.len() - 1;
+    plan.steps[key].separation = LatticeDirection::nearest(Vec3::X);
+    let (grid, built) = make_bodies(&BodyParams::default(), &surface, &plan);
+    // A layer of 1 mm on the rim, where other pieces lie ahead for some millimetres.
+    let layer = Volume::cuboid(Aabb {
+        min: Vec3::new(1.0, 3.0, 0.0),
+        max: Vec3::new(5.0, 20.0, 1.0),
+    });
+    let [of_body, of_wall] =
+        [&built.unwrap().bodies[plan.key()], &grid.wall].map(|solid| solid.intersect(&layer).volume());
+    let off_mm = 1.0 - of_body / of_wall;
+    assert!(off_mm > 0.05 && off_mm < GAP_AND_DRAFT_MM + 0.03, "{off_mm} mm");
 }
 
 #[test]
@@ -195,7 +219,7 @@ fn what_came_off_a_body_with_skin_goes_to_the_body_beside_it() {
     let (surface, plan) = octants();
     let params = BodyParams::default();
     let (grid, built) = make_bodies(&params, &surface, &plan);
-    let mut parts: Vec<(shellock_report::PatchId, Volume)> = Vec::new();
+    let mut parts: Vec<(PatchId, Volume)> = Vec::new();
     for (i, body) in built.unwrap().bodies.as_slice().iter().enumerate() {
         parts.push((i.into(), body.clone()));
     }

@@ -263,7 +263,7 @@ fn make_printable(
     changes: &[Change],
 ) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let meshes: Vec<Result<(TriMesh, bool), PieceError>> = ids
+    let made: Vec<Result<Printable, PieceError>> = ids
         .par_iter()
         .map(|&q| {
             let mut piece = pieces[q].clone();
@@ -278,50 +278,67 @@ fn make_printable(
                 .label
                 .as_ref()
                 .and_then(|params| label::cut(params, grid, plan.position(q) + 1, &piece));
-            let printable =
-                |piece: &Volume| printable_body(&finish.turn.volume(&with_few_triangles(piece, grid)));
             // A number matters less than a piece that can be written.
-            let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
+            let numbered = number.and_then(|cut| printable(finish, grid, &piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
-            let mesh = numbered.map_or_else(|| printable(&piece), Ok);
+            let made = numbered.map_or_else(|| printable(finish, grid, &piece), Ok);
+            let (mesh, has_few) = made.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?;
             ctx.step()?;
-            Ok((
-                mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?,
+            Ok(Printable {
+                mesh,
                 has_number,
-            ))
+                has_few,
+            })
         })
         .collect();
-    let meshes = meshes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let made = made.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let pieces_that = |is_asked: fn(&Printable) -> bool| {
+        let asked = ids.iter().zip(&made).filter(|(_, made)| is_asked(made));
+        asked.map(|(q, _)| *q).collect::<Vec<PatchId>>()
+    };
     if finish.label.is_some() {
-        warn_of_missing_numbers(
-            ctx,
-            ids.iter()
-                .zip(&meshes)
-                .filter(|(_, made)| !made.1)
-                .map(|(q, _)| *q)
-                .collect(),
-        );
+        warn_of_missing_numbers(ctx, pieces_that(|made| !made.has_number));
     }
-    Ok(meshes.into_iter().map(|made| made.0).collect())
+    for piece in pieces_that(|made| !made.has_few) {
+        let number = plan.position(piece) + 1;
+        ctx.note(&format!(
+            "piece {number} keeps all its triangles: with fewer its surface would fold"
+        ));
+    }
+    Ok(made.into_iter().map(|made| made.mesh).collect())
 }
 
-/// The piece with fewer triangles, within [`NEAR_MM`], except on and just below the model's surface. Returns
-/// the piece as it is if no other keeps that distance.
-fn with_few_triangles(piece: &Volume, grid: &ShellGrid) -> Volume {
-    let few = Solid::new(piece.to_mesh()).ok().and_then(|solid| {
-        let is_visible = |&p: &Vec3| {
-            grid.band
-                .sample(&grid.depth, p)
-                .is_some_and(|depth| depth < VISIBLE_MM)
-        };
-        let points = &solid.mesh().points;
-        let fixed: Vec<u32> = (0..points.len() as u32)
-            .filter(|&v| is_visible(&points[v as usize]))
-            .collect();
-        simplify(&solid, &fixed, NEAR_MM)
-    });
-    let few = few.and_then(|few| Volume::from_closed_mesh(few.solid.mesh()).ok());
-    few.unwrap_or_else(|| piece.clone())
+/// A piece that can be written.
+struct Printable {
+    mesh: TriMesh,
+    has_number: bool,
+    /// True if it has as few triangles as [`NEAR_MM`] allows.
+    has_few: bool,
+}
+
+/// A mesh of the piece that can be written, and true if it has fewer triangles.
+fn printable(
+    finish: &FinishParams<'_>,
+    grid: &ShellGrid,
+    piece: &Volume,
+) -> Result<(TriMesh, bool), NotPrintable> {
+    let few = with_few_triangles(piece, |p| grid.band.sample(&grid.depth, p));
+    let has_few = few.is_some();
+    let mesh = printable_body(&finish.turn.volume(few.as_ref().unwrap_or(piece)))?;
+    Ok((mesh, has_few))
+}
+
+/// The piece with fewer triangles, within [`NEAR_MM`], except on and just below the model's surface. `None`
+/// if no other surface keeps that distance. `depth_mm` is the depth below the model's surface, if it is known.
+fn with_few_triangles(piece: &Volume, depth_mm: impl Fn(Vec3) -> Option<f64>) -> Option<Volume> {
+    let solid = Solid::new(piece.to_mesh()).ok()?;
+    let is_visible = |&p: &Vec3| depth_mm(p).is_some_and(|depth| depth < VISIBLE_MM);
+    let points = &solid.mesh().points;
+    let fixed: Vec<u32> = (0..points.len() as u32)
+        .filter(|&v| is_visible(&points[v as usize]))
+        .collect();
+    let few = simplify(&solid, &fixed, NEAR_MM)?;
+    Volume::from_closed_mesh(few.solid.mesh()).ok()
 }
 
 /// Warns of the pieces without a number.
@@ -330,4 +347,35 @@ fn warn_of_missing_numbers(ctx: &Ctx, pieces: Vec<PatchId>) {
         return;
     }
     ctx.warn(Warning::new(Cause::PieceWithoutNumber, pieces, None));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use shellock_test_surfaces::sphere;
+
+    use super::*;
+
+    #[test]
+    fn a_piece_keeps_its_visible_points_and_loses_others_that_its_shape_does_not_need() {
+        const RADIUS_MM: f64 = 5.0;
+        let ball = Volume::from_closed_mesh(&sphere(5, Vec3::splat(RADIUS_MM))).unwrap();
+        // Only the upper half counts as visible.
+        let few = with_few_triangles(&ball, |p| Some(if p.z > 0.0 { 0.0 } else { 1.0 })).unwrap();
+        let points = |volume: &Volume, is_upper: bool| {
+            let points = volume.to_mesh().points.into_iter();
+            let half = points.filter(move |p| (p.z > 0.0) == is_upper);
+            half.map(|p| p.to_array().map(f64::to_bits))
+                .collect::<BTreeSet<_>>()
+        };
+        assert!(points(&few, true).is_superset(&points(&ball, true)));
+        let [n_few, n_all] = [&few, &ball].map(|volume| points(volume, false).len());
+        assert!(10 * n_few < 8 * n_all, "{n_few} of {n_all} points");
+        let middles = few.to_mesh();
+        for face in 0..middles.triangles.len() {
+            let off_mm = RADIUS_MM - middles.face_center(face).length();
+            assert!(off_mm.abs() < 0.005 + 2.0 * NEAR_MM, "{off_mm} mm");
+        }
+    }
 }
