@@ -20,6 +20,27 @@ fn of_a_pinned_lid_nothing_but_the_key_moves() {
 }
 
 #[test]
+fn a_lock_without_a_proof_does_not_pass() {
+    let kit = pinned_kit(|_| {});
+    let (_, contacts) = kit.examine();
+    let assembly = Assembly {
+        model: None,
+        pieces: &kit.pieces,
+        plan: &kit.plan,
+        press_fits: &[],
+    };
+    let with = |ok: bool, contacts: &[Contact]| {
+        let check = Check::new("nothing but the key moves", ok, "as said".to_owned());
+        let check = with_proof(check, &assembly, contacts);
+        (check.ok, check.figure)
+    };
+    assert_eq!(with(true, &contacts), (true, "as said".to_owned()));
+    let unproven = "as said, but no proof is found".to_owned();
+    assert_eq!(with(true, &[]), (false, unproven));
+    assert_eq!(with(false, &[]), (false, "as said".to_owned()));
+}
+
+#[test]
 fn a_tongue_leaves_its_groove_one_way_only() {
     let [base, lid, _] = pinned_lid([[50.0, 51.0], [50.0, 51.0], [50.0, 51.0]]);
     let kit = Kit::new(

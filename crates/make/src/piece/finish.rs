@@ -329,7 +329,7 @@ fn printable(
 }
 
 /// The piece with fewer triangles, within [`NEAR_MM`], except on and just below the model's surface. `None`
-/// if no other surface keeps that distance. `depth_mm` is the depth below the model's surface, if it is known.
+/// if no other surface keeps that distance. `depth_mm` is the depth below that surface, where it is known.
 fn with_few_triangles(piece: &Volume, depth_mm: impl Fn(Vec3) -> Option<f64>) -> Option<Volume> {
     let solid = Solid::new(piece.to_mesh()).ok()?;
     let is_visible = |&p: &Vec3| depth_mm(p).is_some_and(|depth| depth < VISIBLE_MM);

@@ -214,6 +214,9 @@ fn learn(
     allowance: &Allowance,
 ) -> Result<Found<Kit>, DesignError> {
     learned.n_kits += 1;
+    if let Some(fault) = kit.fault() {
+        ctx.note(&format!("a kit of {} pieces was made: {fault}", kit.pieces.len()));
+    }
     let found = if kit.is_firm() {
         Found::nothing(Failure::default())
     } else if kit.only_rattles() {

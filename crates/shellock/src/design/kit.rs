@@ -78,6 +78,17 @@ impl Kit {
             .collect()
     }
 
+    /// The fault of a kit that is not firm, in words.
+    pub(super) fn fault(&self) -> Option<String> {
+        let failures = self.failures();
+        if !failures.is_empty() {
+            return Some(format!("it fails \"{}\"", failures.join("\", \"")));
+        }
+        let rattles = self.rattles.iter().map(|r| r.piece.number().to_string());
+        let rattles: Vec<String> = rattles.collect();
+        (!rattles.is_empty()).then(|| format!("it passes, but pieces {} rattle", rattles.join(", ")))
+    }
+
     /// Returns true if the kit passed its verification and no piece rattles.
     pub fn is_firm(&self) -> bool {
         self.verification.has_passed() && self.rattles.is_empty()
