@@ -87,23 +87,20 @@ fn places(kit: &Kit) -> Vec<Place> {
         .collect()
 }
 
-/// Shows sections across three seams of finished pieces: forward, straight out, and a rail of the key.
+/// Shows sections across three seams of finished pieces: the pins that point most nearly forward and straight
+/// out, and a rail of the key.
 pub fn seams(kit: &Kit) -> Result<Vec<u8>, Failure> {
     const VIEW: [f64; 2] = [WIDTH / 3.0, 210.0];
-    /// Largest difference of a seam's angle from the wanted one, degrees.
-    const ABOUT_DEG: f64 = 14.0;
     let places = places(kit);
-    let longest = |is_such: &dyn Fn(&Place) -> bool| {
-        let such = places.iter().filter(|p| is_such(p));
-        such.max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))
-            .ok_or_else(|| fault("it has no such joint that is whole"))
+    let none = || fault("it has no such joint that is whole");
+    let nearest = |asked: f64| {
+        let pins = places.iter().filter(|p| !p.is_rail);
+        let off = |p: &Place| (p.theta_deg - asked).abs();
+        pins.min_by(|a, b| off(a).total_cmp(&off(b))).ok_or_else(none)
     };
-    let about = |asked: f64| move |p: &Place| !p.is_rail && (p.theta_deg - asked).abs() < ABOUT_DEG;
-    let shown = [
-        longest(&about(-75.0))?,
-        longest(&about(0.0))?,
-        longest(&|p| p.is_rail)?,
-    ];
+    let rails = places.iter().filter(|p| p.is_rail);
+    let longest_rail = rails.max_by(|a, b| a.length_mm.total_cmp(&b.length_mm));
+    let shown = [nearest(-75.0)?, nearest(0.0)?, longest_rail.ok_or_else(none)?];
     let mut sheet = Sheet::new(VIEW[1] + 52.0);
     for (i, place) in shown.into_iter().enumerate() {
         let left = i as f64 * VIEW[0];
