@@ -70,7 +70,7 @@ pub enum Command {
         #[command(flatten)]
         out: Out,
     },
-    /// Make a kit of a figure that comes with the program
+    /// Make a kit of a figure that comes with the program; the same kit on any machine
     Demo {
         /// Which figure: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         #[arg(long, default_value = "squirrel", value_name = "NAME")]

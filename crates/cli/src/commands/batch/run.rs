@@ -15,13 +15,12 @@ use shellock_job::output::PLAN;
 
 use crate::Session;
 use crate::args::BatchOptions;
+use crate::commands::USUAL_EFFORT_S;
 use crate::config;
 
 /// Memory that a kit takes at least, and per MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
 const LEAST_MB: f64 = 600.0;
 const MB_PER_MB: f64 = 12.0;
-/// Work on a kit if neither time nor work is limited, s: so that kits do not depend on what runs beside them.
-const USUAL_EFFORT_S: f64 = 60.0;
 /// Message for a model that was made twice.
 const AGAIN: &str = "made twice: beside others, the time (--time) ran out before a kit passed";
 /// Message for a model without a kit whose folder holds an earlier one.
