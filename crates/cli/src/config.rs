@@ -76,7 +76,7 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     Ok(cli)
 }
 
-/// Returns those of the given arguments of `batch` that are options of `build`.
+/// Returns those of the given arguments of `batch` or `demo` that are options of `build`.
 pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
     let all = args::command();
     let Ok(matches) = all.clone().try_get_matches_from(arguments) else {
@@ -115,6 +115,27 @@ pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
         }
     }
     options
+}
+
+/// Returns true if the arguments or the configuration file limit the time or the work of a kit.
+pub fn has_limit(arguments: &[String], config: &[u8]) -> bool {
+    let is_limit = |name: &str| ["time", "effort"].contains(&name);
+    let of_argument = |word: &String| {
+        let name = word
+            .strip_prefix("--")
+            .map(|word| word.split('=').next().unwrap_or(word));
+        name.is_some_and(is_limit)
+    };
+    let file: toml::Table = toml::from_slice(config).unwrap_or_default();
+    arguments.iter().any(of_argument) || file.keys().any(|key| is_limit(key))
+}
+
+/// Returns true if the user limits the time or the work of a kit, by an argument or by the configuration file
+/// of `options`.
+pub fn is_limited(options: &args::JobOptions) -> bool {
+    let arguments = build_arguments(std::env::args_os().collect());
+    let file = options.config.clone().unwrap_or_else(|| PathBuf::from(USUAL));
+    has_limit(&arguments, &std::fs::read(file).unwrap_or_default())
 }
 
 /// Returns the project file that is given instead of a model; fails if a configuration file is named, too.
@@ -221,4 +242,19 @@ fn extra_arguments(
         }
     }
     Ok(extra)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_limited_unless_the_user_limits_time_or_work() {
+        let has = |words: &str, config: &str| {
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            has_limit(&words, config.as_bytes())
+        };
+        assert!(!has("--size 80 --plan-time 5", "size = 80"));
+        assert!(has("--time 0", "") && has("--effort=9", "") && has("--size 80", "time = 30"));
+    }
 }

@@ -179,7 +179,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
     use inspect::Wanted;
     match command {
         Command::Build { model, options, out } => build::build(session, &model, &options.options, out),
-        Command::Demo { figure, options, out } => build::demo(session, &figure, &options.options, out),
+        Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
         Command::Segment { model, options, out } => segment::segment(session, &model, &options.options, &out),
         Command::Plan { model, options } => plan::plan(session, &model, &options.options),
         Command::Verify { kit, model } if kit.join(ASSEMBLY).is_file() => {

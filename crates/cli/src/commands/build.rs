@@ -17,10 +17,10 @@ use shellock_job::work;
 use shellock_job::{Failure, Options};
 
 use super::USUAL_EFFORT_S;
-use crate::Session;
-use crate::args::Out;
+use crate::args::{JobOptions, Out};
 use crate::print::{Finished, print_failures, print_input_warnings, print_warnings};
 use crate::progress::{Display, Shown};
+use crate::{Session, config};
 
 /// Runs `shellock build` and returns the exit code.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
@@ -38,18 +38,14 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
 
 /// Runs `shellock demo` and returns the exit code. Unless a limit is given, the work is limited instead of
 /// the time, so that a slow machine makes the same kit.
-pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
+pub fn demo(session: &Session, figure: &str, given: &JobOptions, out: Out) -> Result<u8, Failure> {
     /// Default number of pieces of the squirrel: fewer than usual, which lock sooner.
     const OF_SQUIRREL: usize = 7;
-    let has_limit = options.effort.is_some() || options.time != Options::default().time;
-    let options = &Options {
-        effort: if has_limit {
-            options.effort
-        } else {
-            Some(USUAL_EFFORT_S)
-        },
-        ..options.clone()
-    };
+    let mut options = given.options.clone();
+    if !config::is_limited(given) {
+        options.effort = Some(USUAL_EFFORT_S);
+    }
+    let options = &options;
     let mut params = check_options(options)?;
     if figure == "squirrel" && options.pieces == Pieces::Auto {
         params.n_pieces = Some(OF_SQUIRREL);

@@ -302,7 +302,7 @@ fn make_printable(
     for piece in pieces_that(|made| !made.has_few) {
         let number = plan.position(piece) + 1;
         ctx.note(&format!(
-            "piece {number} keeps all its triangles: with fewer its surface would fold"
+            "piece {number} keeps all its triangles: with fewer its surface would move or fold"
         ));
     }
     Ok(made.into_iter().map(|made| made.mesh).collect())

@@ -2,6 +2,7 @@
 
 use shellock_assembly::motion::Contact;
 use shellock_geom::{Solid, TriMesh};
+use shellock_report::words;
 
 use super::agenda::Grade;
 use super::division::Division;
@@ -84,9 +85,9 @@ impl Kit {
         if !failures.is_empty() {
             return Some(format!("it fails \"{}\"", failures.join("\", \"")));
         }
-        let rattles = self.rattles.iter().map(|r| r.piece.number().to_string());
-        let rattles: Vec<String> = rattles.collect();
-        (!rattles.is_empty()).then(|| format!("it passes, but pieces {} rattle", rattles.join(", ")))
+        let loose: Vec<PatchId> = self.rattles.iter().map(|r| r.piece).collect();
+        let verb = words::plural(loose.len(), "rattles", "rattle");
+        (!loose.is_empty()).then(|| format!("it passes, but {} {verb}", words::pieces(&loose)))
     }
 
     /// Returns true if the kit passed its verification and no piece rattles.

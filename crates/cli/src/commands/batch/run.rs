@@ -42,19 +42,6 @@ pub struct Run {
     cores: usize,
 }
 
-/// Returns true if the arguments or the configuration file limit the time or the work of a kit.
-fn has_limit(arguments: &[String], config: &[u8]) -> bool {
-    let is_limit = |name: &str| ["time", "effort"].contains(&name);
-    let of_argument = |word: &String| {
-        let name = word
-            .strip_prefix("--")
-            .map(|word| word.split('=').next().unwrap_or(word));
-        name.is_some_and(is_limit)
-    };
-    let file: toml::Table = toml::from_slice(config).unwrap_or_default();
-    arguments.iter().any(of_argument) || file.keys().any(|key| is_limit(key))
-}
-
 impl Run {
     pub fn new(options: &BatchOptions, n_models: usize) -> Result<Self, Failure> {
         // All cores, or --threads.
@@ -66,14 +53,14 @@ impl Run {
             .config
             .clone()
             .unwrap_or_else(|| PathBuf::from(USUAL));
-        let config = fs::read(file).unwrap_or_default();
-        if !has_limit(&arguments, &config) {
+        let content = fs::read(file).unwrap_or_default();
+        if !config::has_limit(&arguments, &content) {
             arguments.push(format!("--effort={USUAL_EFFORT_S}"));
         }
         let made_with = [
             super::program().as_bytes(),
             arguments.join("\n").as_bytes(),
-            &config[..],
+            &content[..],
         ]
         .map(|part: &[u8]| sha256(part))
         .concat();
@@ -230,19 +217,4 @@ fn patience(seconds: f64) -> Result<Duration, Failure> {
         return Err(Failure::Wrong(format!("--patience {seconds} s must be above 0")));
     }
     Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn work_is_limited_unless_the_user_limits_time_or_work() {
-        let has = |words: &str, config: &str| {
-            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
-            has_limit(&words, config.as_bytes())
-        };
-        assert!(!has("--size 80 --plan-time 5", "size = 80"));
-        assert!(has("--time 0", "") && has("--effort=9", "") && has("--size 80", "time = 30"));
-    }
 }
