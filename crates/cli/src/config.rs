@@ -117,17 +117,30 @@ pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
     options
 }
 
-/// Returns true if the arguments or the configuration file limit the time or the work of a kit.
-pub fn has_limit(arguments: &[String], config: &[u8]) -> bool {
-    let is_limit = |name: &str| ["time", "effort"].contains(&name);
+/// Limit of a kit that the user gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Time on this machine.
+    Time,
+    /// Work, which is equal on all machines.
+    Work,
+}
+
+/// Returns the limit that the arguments or the configuration file give a kit.
+pub fn limit(arguments: &[String], config: &[u8]) -> Option<Limit> {
+    let of_name = |name: &str| match name {
+        "time" => Some(Limit::Time),
+        "effort" => Some(Limit::Work),
+        _ => None,
+    };
     let of_argument = |word: &String| {
-        let name = word
-            .strip_prefix("--")
-            .map(|word| word.split('=').next().unwrap_or(word));
-        name.is_some_and(is_limit)
+        let word = word.strip_prefix("--")?;
+        of_name(word.split('=').next().unwrap_or(word))
     };
     let file: toml::Table = toml::from_slice(config).unwrap_or_default();
-    arguments.iter().any(of_argument) || file.keys().any(|key| is_limit(key))
+    // An argument overrides the file.
+    let of_arguments = arguments.iter().find_map(of_argument);
+    of_arguments.or_else(|| file.keys().find_map(|key| of_name(key)))
 }
 
 /// Returns true if the user limits the time or the work of a kit, by an argument or by the configuration file
@@ -135,7 +148,7 @@ pub fn has_limit(arguments: &[String], config: &[u8]) -> bool {
 pub fn is_limited(options: &args::JobOptions) -> bool {
     let arguments = build_arguments(std::env::args_os().collect());
     let file = options.config.clone().unwrap_or_else(|| PathBuf::from(USUAL));
-    has_limit(&arguments, &std::fs::read(file).unwrap_or_default())
+    limit(&arguments, &std::fs::read(file).unwrap_or_default()).is_some()
 }
 
 /// Returns the project file that is given instead of a model; fails if a configuration file is named, too.
@@ -249,12 +262,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_is_limited_unless_the_user_limits_time_or_work() {
-        let has = |words: &str, config: &str| {
+    fn an_argument_limits_time_or_work_before_the_file_does() {
+        let of = |words: &str, config: &str| {
             let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
-            has_limit(&words, config.as_bytes())
+            limit(&words, config.as_bytes())
         };
-        assert!(!has("--size 80 --plan-time 5", "size = 80"));
-        assert!(has("--time 0", "") && has("--effort=9", "") && has("--size 80", "time = 30"));
+        assert_eq!(of("--size 80 --plan-time 5", "size = 80"), None);
+        assert_eq!(of("--time 0", "effort = 5"), Some(Limit::Time));
+        assert_eq!(of("--effort=9", "time = 30"), Some(Limit::Work));
+        assert_eq!(of("--size 80", "time = 30"), Some(Limit::Time));
     }
 }

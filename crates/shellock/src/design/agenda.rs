@@ -554,8 +554,11 @@ impl Agenda {
         }
     }
 
-    /// Seconds kept for the ways after the present one.
+    /// Seconds kept for the ways after the present one; none once a kit passes, since they are not taken then.
     fn reserved_s(&self) -> f64 {
+        if self.best.is_some_and(|best| best.passes()) {
+            return 0.0;
+        }
         self.clock.reserved_s(self.count(Step::NextWay), self.ways.len())
     }
 

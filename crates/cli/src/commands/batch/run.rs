@@ -16,7 +16,7 @@ use shellock_job::output::PLAN;
 use crate::Session;
 use crate::args::BatchOptions;
 use crate::commands::USUAL_EFFORT_S;
-use crate::config;
+use crate::config::{self, Limit};
 
 /// Memory that a kit takes at least, and per MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
 const LEAST_MB: f64 = 600.0;
@@ -37,6 +37,8 @@ pub struct Run {
     arguments: Vec<String>,
     /// Hashes of all inputs except the model: program, options, configuration file.
     made_with: String,
+    /// True if kits have a limit of time, so that a kit made alone may get farther.
+    limits_time: bool,
     patience: Duration,
     pub n_workers: usize,
     cores: usize,
@@ -54,7 +56,8 @@ impl Run {
             .clone()
             .unwrap_or_else(|| PathBuf::from(USUAL));
         let content = fs::read(file).unwrap_or_default();
-        if !config::has_limit(&arguments, &content) {
+        let limit = config::limit(&arguments, &content);
+        if limit.is_none() {
             arguments.push(format!("--effort={USUAL_EFFORT_S}"));
         }
         let made_with = [
@@ -71,6 +74,7 @@ impl Run {
                 .map_err(|e| Failure::Wrong(format!("the program cannot find its own file: {e}")))?,
             arguments,
             made_with,
+            limits_time: limit == Some(Limit::Time),
             patience: patience(options.patience)?,
             n_workers,
             cores,
@@ -173,7 +177,7 @@ impl Run {
                     .said
                     .push(format!("it took longer than {seconds:.0} s (--patience)"));
             }
-            Ok(ended) => record = with_result(record, ended, is_alone),
+            Ok(ended) => record = with_result(record, ended, self.limits_time && !is_alone),
             Err(e) => {
                 record.status = Status::Crashed;
                 record.said.push(e.to_string());
@@ -191,14 +195,13 @@ impl Run {
     }
 }
 
-/// Adds the result of a process that ended in time.
-fn with_result(mut record: Record, ended: Ended, is_alone: bool) -> Record {
+/// Adds the result of a process that ended in time. `may_try_again` is true where another run may get farther.
+fn with_result(mut record: Record, ended: Ended, may_try_again: bool) -> Record {
     record.status = Status::of_code(ended.code);
     record.peak_mb = ended.peak_mb;
     record = record.of_output(&ended.output);
-    // A model that was made alone had all resources, so another try would not help.
     let may_pass = matches!(record.status, Status::Failed | Status::NoPlan);
-    record.lacks_time &= may_pass && !is_alone;
+    record.lacks_time &= may_pass && may_try_again;
     if record.status == Status::Crashed {
         let first = ended.errors.len().saturating_sub(KEPT_LINES);
         record.said.extend_from_slice(&ended.errors[first..]);
@@ -217,4 +220,29 @@ fn patience(seconds: f64) -> Result<Duration, Failure> {
         return Err(Failure::Wrong(format!("--patience {seconds} s must be above 0")));
     }
     Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A kit that is limited by work, or was made alone, would be the same kit again.
+    #[test]
+    fn a_kit_is_made_again_only_if_it_failed_for_lack_of_time_that_another_run_has() {
+        let lacks_time = |code: i32, may_try_again: bool| {
+            let entry = Entry {
+                model: "a.stl".into(),
+                kit: "a".into(),
+            };
+            let ended = Ended {
+                code: Some(code),
+                output: r#"{"warnings": [{"code": "time-up", "severity": "warning"}]}"#.into(),
+                ..Ended::default()
+            };
+            with_result(Record::blank(&entry, String::new()), ended, may_try_again).lacks_time
+        };
+        let failed = (0..=9).find(|code| Status::of_code(Some(*code)) == Status::Failed);
+        let failed = failed.expect("a kit that fails has an exit code");
+        assert!(lacks_time(failed, true) && !lacks_time(failed, false) && !lacks_time(0, true));
+    }
 }
