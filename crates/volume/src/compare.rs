@@ -145,13 +145,14 @@ pub fn compare(
 /// built on it, a somewhat finer or coarser mesh usually does not.
 const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
 
-/// The model on the first of these meshes on which walls can be built.
+/// The model on that of these meshes on which walls leave out the fewest triangles; the first of several.
 fn sound_model(
     ctx: &Ctx<'_>,
     params: &StressParams,
     surface: &SegmentedSurface,
 ) -> Result<PlanModel, CompareError> {
     let mut failure = None;
+    let mut best: Option<(usize, f64, PlanModel)> = None;
     for share in EDGE_SHARES {
         let model = PlanModel::new(
             &MetricParams {
@@ -164,17 +165,32 @@ fn sound_model(
         match volume_model(&model) {
             Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
             Err(e) => return Err(e.into()),
-            Ok(_) => {
-                if share != 1.0 {
-                    ctx.note(&format!(
-                        "the mesh folds; its edges are made {share} times as long as asked for"
-                    ));
+            Ok(walls) => {
+                let n_left_out = walls.wall().n_left_out;
+                if best.as_ref().is_none_or(|(least, ..)| n_left_out < *least) {
+                    best = Some((n_left_out, share, model));
                 }
-                return Ok(model);
+                if n_left_out == 0 {
+                    break;
+                }
             }
         }
     }
-    Err(failure.map_or(VolumeError::Contact, |e| e).into())
+    let Some((n_left_out, share, model)) = best else {
+        return Err(failure.map_or(VolumeError::Contact, |e| e).into());
+    };
+    if share != 1.0 {
+        ctx.note(&format!(
+            "the mesh folds; its edges are made {share} times as long as asked for"
+        ));
+    }
+    if n_left_out > 0 {
+        let n_all = model.assembly.triangles.len();
+        ctx.note(&format!(
+            "no wall fits below {n_left_out} of {n_all} triangles, which lie in creases; they are left out"
+        ));
+    }
+    Ok(model)
 }
 
 /// The drawn plan whose least load factor is nearest, by ratio, to half of `score`, with that factor.

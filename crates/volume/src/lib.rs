@@ -134,7 +134,7 @@ pub enum VolumeError {
     /// finite.
     #[error("the assembly is inconsistent: {0}")]
     Assembly(&'static str),
-    /// No wall fits below a triangle, however thin.
+    /// No wall fits below a triangle, however thin, and it cannot be left out.
     #[error("triangle {0} has no area, or its normals point along it: remesh the surface")]
     FlatTriangle(u32),
     /// The number of joints differs from the number of stations.
@@ -218,7 +218,7 @@ impl VolumeModel {
         for &point in clamped {
             is_clamped[point as usize] = true;
         }
-        let near = near_stations(assembly, params.n_layers);
+        let near = near_stations(assembly, &wall);
         let mut is_kept = vec![false; wall.nodes.len()];
         for &tet in near.iter().flatten().flatten() {
             for node in wall.tets[tet as usize] {
@@ -548,19 +548,16 @@ fn check(assembly: &ShellAssembly, clamped: &[u32]) -> Result<(), VolumeError> {
 }
 
 /// Tetrahedra below the triangles around each station's points.
-fn near_stations(assembly: &ShellAssembly, n_layers: usize) -> Vec<[Vec<u32>; 2]> {
+fn near_stations(assembly: &ShellAssembly, wall: &Wall) -> Vec<[Vec<u32>; 2]> {
     let mut about: Vec<Vec<u32>> = vec![Vec::new(); assembly.points.len()];
     for (i, t) in (0..).zip(&assembly.triangles) {
         for point in t {
             about[*point as usize].push(i);
         }
     }
-    let per_triangle = 3 * n_layers as u32;
     let below = |point: u32| {
-        let tets = about[point as usize]
-            .iter()
-            .flat_map(|t| t * per_triangle..(t + 1) * per_triangle);
-        tets.collect()
+        let triangles = about[point as usize].iter();
+        triangles.flat_map(|t| wall.tets_below(*t)).collect()
     };
     assembly.stations.iter().map(|s| s.points.map(below)).collect()
 }

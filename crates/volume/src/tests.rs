@@ -442,6 +442,27 @@ fn where_no_wall_fits_it_is_thinner_and_sound() {
     assert!(model.wall().depth_mm.iter().all(|d| *d < 5.0));
 }
 
+/// A ball with one triangle pinched to a needle: its middle corner lies on the opposite edge.
+#[test]
+fn a_flat_triangle_is_left_out_and_the_others_carry_the_load() {
+    let mut ball = sample::ball(20.0, 16);
+    let is_inner = |t: &[u32; 3]| {
+        let on_seam = |p: &u32| ball.stations.iter().any(|s| s.points.contains(p));
+        !t.iter().any(on_seam)
+    };
+    let flat = ball.triangles.iter().position(is_inner).unwrap();
+    let [a, b, c] = ball.triangles[flat].map(|p| p as usize);
+    ball.points[a] = ball.points[b].midpoint(ball.points[c]);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    assert_eq!(model.wall().n_left_out, 1);
+    assert_eq!(model.n_tets(), 3 * (ball.triangles.len() - 1));
+    assert!((0..model.n_tets()).all(|t| element::volume_6(model.wall().corners(t)) > 0.0));
+    assert!(matches!(
+        model.resist(&join(&ball, 0.0, Some(7)), 7),
+        Ok(Resistance::Holds(_))
+    ));
+}
+
 fn quality(params: &VolumeParams, degrees: f64) -> f64 {
     let ball = sample::ball(15.0, 4);
     let model = VolumeModel::new(params, &ball).unwrap();
