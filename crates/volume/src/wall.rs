@@ -47,8 +47,8 @@ pub struct Wall {
     pub n_left_out: usize,
 }
 
-/// Triangle on which no prism fits, however thin, and which cannot be left out: too many others are, or one of
-/// its points has no other wall.
+/// Triangle on which no prism fits, however thin, and which cannot be left out: too many others are, or one
+/// of its points has no other wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FlatTriangle(pub u32);
 

@@ -554,7 +554,7 @@ impl Agenda {
         }
     }
 
-    /// Seconds kept for the ways after the present one; none once a kit passes, since they are not taken then.
+    /// Seconds kept for the ways after the present one; none once a kit passes, since no way follows then.
     fn reserved_s(&self) -> f64 {
         if self.best.is_some_and(|best| best.passes()) {
             return 0.0;

@@ -195,7 +195,8 @@ impl Run {
     }
 }
 
-/// Adds the result of a process that ended in time. `may_try_again` is true where another run may get farther.
+/// Adds the result of a process that ended in time. `may_try_again` is true where another run may get
+/// farther.
 fn with_result(mut record: Record, ended: Ended, may_try_again: bool) -> Record {
     record.status = Status::of_code(ended.code);
     record.peak_mb = ended.peak_mb;
