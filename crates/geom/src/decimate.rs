@@ -5,6 +5,8 @@
 //! (its *share*). Divided by the sum of shares this is the mean square distance. Beyond 30 shares the divisor
 //! stays constant, so that a bump in a wide plain is not averaged away.
 
+mod caps;
+
 use glam::DMat3;
 use rayon::prelude::*;
 
@@ -29,6 +31,10 @@ const MOST_ROUNDS: u32 = 20;
 const GONE: u32 = u32::MAX;
 /// Least cosine between a triangle's normals before and after a collapse: 60°.
 const LEAST_COS: f64 = 0.5;
+/// Height of a sliver, as a share of the tolerance, and least cosine between its normal after a collapse and
+/// the mean normal around it: 78°, as on the edge of a cube.
+const FLAT_SHARE: f64 = 1.0;
+const LEAST_MEAN_COS: f64 = 0.1;
 /// Least height of a triangle after a collapse, as a share of its longest edge, unless the triangle was worse
 /// before.
 const LEAST_HEIGHT: f64 = 0.03;
@@ -41,8 +47,28 @@ const LEAST_HEIGHT: f64 = 0.03;
 /// vertex takes part in at most one collapse, along its cheapest edge. This needs no queue and gives even
 /// triangles. Sequential, so that the same mesh always gives the same bytes.
 pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
+    run(mesh, tolerance_mm, Care::Fast)
+}
+
+/// Decimates like [`decimate`], and leaves fewer triangles and hardly any sliver: a vertex whose cheapest
+/// edge may not collapse tries its others, the long edges of flat triangles are flipped, and a point without
+/// tolerance takes others in.
+pub fn decimate_with_care(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
+    run(mesh, tolerance_mm, Care::Thorough)
+}
+
+/// Edges that are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Care {
+    /// The cheapest of each vertex.
+    Fast,
+    /// All edges of each vertex, cheapest first; slivers are removed, too.
+    Thorough,
+}
+
+fn run(mesh: TriMesh, tolerance_mm: &[f64], care: Care) -> TriMesh {
     assert_eq!(mesh.points.len(), tolerance_mm.len(), "one tolerance a point");
-    let Some(mut state) = Decimation::new(&mesh, tolerance_mm) else {
+    let Some(mut state) = Decimation::new(&mesh, tolerance_mm, care) else {
         return mesh;
     };
     let mut alive: Vec<u32> = (0..mesh.points.len() as u32)
@@ -52,7 +78,10 @@ pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
         let share = EARLY_SHARES.get(round as usize - 1).copied().unwrap_or(1.0);
         let n_before = alive.len();
         for &v in &alive {
-            state.collapse_cheapest(v, round, share);
+            state.collapse_at(v, round, share);
+        }
+        if care == Care::Thorough {
+            state.flip_caps();
         }
         alive.retain(|&v| state.is_alive(v));
         let n_gone = n_before - alive.len();
@@ -127,6 +156,7 @@ struct Decimation {
     tolerance: Vec<f64>,
     /// Last round in which each vertex took part in a collapse; [`GONE`] if it was merged into another.
     round: Vec<u32>,
+    care: Care,
 }
 
 fn prev(h: HalfEdge) -> HalfEdge {
@@ -134,7 +164,7 @@ fn prev(h: HalfEdge) -> HalfEdge {
 }
 
 impl Decimation {
-    fn new(mesh: &TriMesh, tolerance_mm: &[f64]) -> Option<Self> {
+    fn new(mesh: &TriMesh, tolerance_mm: &[f64], care: Care) -> Option<Self> {
         let topology = Topology::of_mesh(mesh)?;
         let n_half_edges = topology.n_half_edges() as u32;
         let middle = mesh.bounds().center();
@@ -166,6 +196,7 @@ impl Decimation {
             quadrics,
             tolerance: tolerance_mm.to_vec(),
             round: vec![0; mesh.points.len()],
+            care,
         };
         state.has_disks_only().then_some(state)
     }
@@ -200,20 +231,24 @@ impl Decimation {
         self.round[v as usize] != GONE
     }
 
-    /// Collapses the cheapest edge at `v` within `share` of the squared tolerance. Edges whose ends took part
-    /// in a collapse of this round are excluded.
-    fn collapse_cheapest(&mut self, v: u32, round: u32, share: f64) {
+    /// Collapses the cheapest edge at `v` within `share` of the squared tolerance; with [`Care::Thorough`]
+    /// the cheapest that may collapse. Edges whose ends took part in a collapse of this round are excluded.
+    fn collapse_at(&mut self, v: u32, round: u32, share: f64) {
         if self.round[v as usize] >= round {
             return;
         }
-        let cheapest = self
+        let mut edges: Vec<(HalfEdge, Vec3, f64)> = self
             .around(v)
             .filter(|&h| self.round[self.ends(h)[1] as usize] < round)
             .filter_map(|h| self.place_merge(h, share).map(|(at, cost)| (h, at, cost)))
-            .min_by(|a, b| a.2.total_cmp(&b.2));
-        if let Some((h, at, _)) = cheapest
-            && self.may_collapse(h, at)
-        {
+            .collect();
+        edges.sort_by(|a, b| a.2.total_cmp(&b.2));
+        let n_tried = match self.care {
+            Care::Fast => 1,
+            Care::Thorough => edges.len(),
+        };
+        let tried = &edges[..n_tried.min(edges.len())];
+        if let Some(&(h, at, _)) = tried.iter().find(|(h, at, _)| self.may_collapse(*h, *at)) {
             self.collapse(h, at, round);
         }
     }
@@ -222,12 +257,24 @@ impl Decimation {
     /// `share` of the squared tolerance.
     fn place_merge(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
         let [u, v] = self.ends(h).map(|x| x as usize);
-        let limit = self.tolerance[u].min(self.tolerance[v]);
+        let [low, high] = match self.tolerance[u] <= self.tolerance[v] {
+            true => [u, v],
+            false => [v, u],
+        };
+        let stays = self.tolerance[low] <= 0.0;
+        // A point that stays can take another one in.
+        let limit = match (stays, self.care) {
+            (true, Care::Thorough) => self.tolerance[high],
+            _ => self.tolerance[low],
+        };
         if limit <= 0.0 {
             return None;
         }
         let q = self.quadrics[u].plus(self.quadrics[v]);
-        let at = q.least(0.5 * (self.points[u] + self.points[v]));
+        let at = match stays {
+            true => self.points[low],
+            false => q.least(0.5 * (self.points[u] + self.points[v])),
+        };
         let error = q.at(at);
         let cost = error + SHORT_FIRST * self.points[u].distance_squared(self.points[v]);
         (error <= share * limit * limit && at.is_finite()).then_some((at, cost))
@@ -247,11 +294,31 @@ impl Decimation {
             && sides.iter().all(|&w| self.around(w).nth(3).is_some())
             && [(u, v), (v, u)]
                 .iter()
-                .all(|&(moved, gone)| self.keeps_shape(moved, gone, at))
+                .all(|&(moved, gone)| self.keeps_shape(moved, gone, at, self.worst_removed(h)))
     }
 
-    fn keeps_shape(&self, moved: u32, gone: u32, at: Vec3) -> bool {
+    /// Least height, as a share of the longest edge, of the triangles that a collapse removes: others may
+    /// become as flat. Infinite unless slivers are to be removed.
+    fn worst_removed(&self, h: HalfEdge) -> f64 {
+        if self.care == Care::Fast {
+            return f64::INFINITY;
+        }
+        let shape = |h: HalfEdge| {
+            let [a, b, c] =
+                [h, Topology::next(h), prev(h)].map(|h| self.points[self.start[h as usize] as usize]);
+            let longest_sq = a
+                .distance_squared(b)
+                .max(b.distance_squared(c))
+                .max(c.distance_squared(a));
+            (b - a).cross(c - a).length() / longest_sq.max(f64::MIN_POSITIVE)
+        };
+        shape(h).min(shape(self.opposite[h as usize]))
+    }
+
+    fn keeps_shape(&self, moved: u32, gone: u32, at: Vec3, worst_removed: f64) -> bool {
         let p = self.points[moved as usize];
+        let flat_mm = self.flat_mm(moved);
+        let mean = self.mean_normal(moved, flat_mm);
         self.around(moved).all(|h| {
             let (b, c) = (self.ends(h)[1], self.start[prev(h) as usize]);
             if b == gone || c == gone {
@@ -260,14 +327,41 @@ impl Decimation {
             let (b, c) = (self.points[b as usize], self.points[c as usize]);
             let (before, after) = ((b - p).cross(c - p), (b - at).cross(c - at));
             let (old, new) = (before.length(), after.length());
-            let height = |doubled_area: f64, p: Vec3| {
-                doubled_area
-                    / b.distance_squared(c)
-                        .max(p.distance_squared(b))
-                        .max(p.distance_squared(c))
+            let longest_sq = |p: Vec3| {
+                b.distance_squared(c)
+                    .max(p.distance_squared(b))
+                    .max(p.distance_squared(c))
             };
-            before.dot(after) > LEAST_COS * old * new && height(new, at) >= LEAST_HEIGHT.min(height(old, p))
+            let height = |doubled_area: f64, p: Vec3| doubled_area / longest_sq(p);
+            // The normal of a sliver says nothing about the surface.
+            let is_sliver = old < flat_mm * longest_sq(p).sqrt();
+            let is_upright = match is_sliver {
+                true => mean.dot(after) > LEAST_MEAN_COS * new,
+                false => before.dot(after) > LEAST_COS * old * new,
+            };
+            is_upright && height(new, at) >= LEAST_HEIGHT.min(height(old, p)).min(worst_removed)
         })
+    }
+
+    /// Height below which a triangle at `v` is a sliver, mm; 0 if none is.
+    fn flat_mm(&self, v: u32) -> f64 {
+        match self.care {
+            Care::Fast => 0.0,
+            Care::Thorough => FLAT_SHARE * self.tolerance[v as usize],
+        }
+    }
+
+    /// Unit normal of the surface around `v`; zero unless it is asked for.
+    fn mean_normal(&self, v: u32, flat_mm: f64) -> Vec3 {
+        if flat_mm == 0.0 {
+            return Vec3::ZERO;
+        }
+        let p = self.points[v as usize];
+        let normal = |h: HalfEdge| {
+            let (b, c) = (self.ends(h)[1], self.start[prev(h) as usize]);
+            (self.points[b as usize] - p).cross(self.points[c as usize] - p)
+        };
+        self.around(v).map(normal).sum::<Vec3>().normalize_or_zero()
     }
 
     /// Merges the end of `h` into its start, which moves to `at`.
@@ -323,7 +417,7 @@ impl Decimation {
 mod tests {
     use super::*;
     use crate::contour::contour;
-    use crate::{Aabb, Solid};
+    use crate::{Aabb, Solid, Volume};
 
     fn body(size: f64, distance: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
         contour(
@@ -387,6 +481,67 @@ mod tests {
         };
         assert_eq!(right(&few), right(&ball));
         assert!(few.points.len() < ball.points.len());
+    }
+
+    /// Two balls that overlap: their union has slivers along the curve where they meet.
+    fn two_balls() -> TriMesh {
+        let ball = body(11.0, |p| 10.0 - p.length());
+        let moved = TriMesh {
+            points: ball
+                .points
+                .iter()
+                .map(|p| *p + Vec3::new(7.03, 1.02, 0.51))
+                .collect(),
+            triangles: ball.triangles.clone(),
+        };
+        let [a, b] = [&ball, &moved].map(|mesh| Volume::from_closed_mesh(mesh).expect("closed"));
+        a.union(&b).to_mesh()
+    }
+
+    fn n_slivers(mesh: &TriMesh) -> usize {
+        (0..mesh.triangles.len())
+            .filter(|&f| mesh.face_area(f) < 1e-3)
+            .count()
+    }
+
+    #[test]
+    fn with_care_there_are_fewer_triangles_and_hardly_any_sliver() {
+        let both = two_balls();
+        let tolerance = vec![0.02; both.points.len()];
+        let fast = decimate(both.clone(), &tolerance);
+        let careful = decimate_with_care(both.clone(), &tolerance);
+        assert!(careful.triangles.len() < fast.triangles.len());
+        assert!(n_slivers(&both) > 20);
+        assert!(
+            10 * n_slivers(&careful) < n_slivers(&both),
+            "{}",
+            n_slivers(&careful)
+        );
+        let solid = Solid::new(careful).expect("closed");
+        assert!((solid.mesh().signed_volume() / both.signed_volume() - 1.0).abs() < 2e-3);
+        for at in (0..solid.mesh().triangles.len()).map(|f| solid.mesh().face_center(f)) {
+            let off = (at.length() - 10.0).min(at.distance(Vec3::new(7.03, 1.02, 0.51)) - 10.0);
+            assert!(off.abs() < 0.15, "{off}");
+        }
+    }
+
+    #[test]
+    fn with_care_points_without_tolerance_stay_and_take_others_in() {
+        let ball = body(11.0, |p| 10.0 - p.length());
+        let stays = |p: &Vec3| p.x > 0.0;
+        let tolerance: Vec<f64> = ball
+            .points
+            .iter()
+            .map(|p| if stays(p) { 0.0 } else { 0.1 })
+            .collect();
+        let n_left = |mesh: &TriMesh| mesh.points.iter().filter(|p| !stays(p)).count();
+        let (fast, careful) = (
+            decimate(ball.clone(), &tolerance),
+            decimate_with_care(ball.clone(), &tolerance),
+        );
+        let is_kept = |p: &Vec3| careful.points.iter().any(|q| p.distance(*q) < 1e-9);
+        assert!(ball.points.iter().filter(|p| stays(p)).all(is_kept));
+        assert!(n_left(&careful) < n_left(&fast));
     }
 
     #[test]

@@ -1,15 +1,15 @@
 //! Simplification: fewer triangles within a given distance of a solid, so that detail too fine for printing
 //! costs no time.
 //!
-//! [`decimate`] keeps a mean of squared distances small. Here the distance itself is measured afterwards,
-//! both ways, and the triangles around points that moved too far are restored.
+//! [`decimate_with_care`] keeps a mean of squared distances small. Here the distance itself is measured
+//! afterwards, both ways, and what is around points that moved too far is allowed to move less.
 
 use std::collections::HashSet;
 
 use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
-use crate::decimate::decimate;
+use crate::decimate::decimate_with_care;
 use crate::fold::folded_faces;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
@@ -20,9 +20,10 @@ const MEAN_SHARE: f64 = 0.4;
 /// Largest number of rounds of restoring points that moved too far.
 const MOST_ROUNDS: usize = 12;
 
-/// Number of rounds that restore only the triangle beside such a point. Later ones restore its neighbours,
-/// too: what lies beside a point may move it.
-const NARROW_ROUNDS: usize = 2;
+/// Number of rounds after which triangles that moved too far may move less, by this share each time. After
+/// the later rounds they stay, and their neighbours, too: what lies beside a point may move it.
+const GENTLE_ROUNDS: usize = 3;
+const GENTLER: f64 = 0.25;
 
 /// A solid with fewer triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +49,7 @@ pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplifi
         tolerance[point as usize] = 0.0;
     }
     for round in 0..MOST_ROUNDS {
-        let few = decimate(mesh.clone(), &tolerance);
+        let few = decimate_with_care(mesh.clone(), &tolerance);
         let new = TriangleBvh::new(&few);
         let (mut away, of_old) = points_away(mesh, &new, within_mm);
         let (stray, of_new) = points_away(&few, &old, within_mm);
@@ -77,14 +78,19 @@ pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplifi
         away.extend(crossed.iter().flat_map(corners_and_middle));
         let nearest = |at: Vec3| old.nearest(at, f64::INFINITY).map(|n| n.face);
         let beside: Vec<u32> = away.into_par_iter().filter_map(nearest).collect();
-        let n_rings = if round < NARROW_ROUNDS { 0 } else { 1 };
-        restore(&mut tolerance, mesh, &beside, n_rings);
+        let (share, n_rings) = if round < GENTLE_ROUNDS {
+            (GENTLER, 0)
+        } else {
+            (0.0, 1)
+        };
+        restore(&mut tolerance, mesh, &beside, share, n_rings);
     }
     None
 }
 
-/// Lets the corners of `faces` stay, and with `n_rings` those of as many rings of triangles around them.
-fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], n_rings: usize) {
+/// Reduces the tolerance of the corners of `faces` to a `share`, and with `n_rings` of those of as many rings
+/// of triangles around them.
+fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], share: f64, n_rings: usize) {
     let mut stays = vec![false; tolerance.len()];
     for v in faces.iter().flat_map(|&f| mesh.triangles[f as usize]) {
         stays[v as usize] = true;
@@ -100,7 +106,7 @@ fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], n_rings: usize)
         }
     }
     for (tolerance, _) in tolerance.iter_mut().zip(&stays).filter(|(_, stays)| **stays) {
-        *tolerance = 0.0;
+        *tolerance *= share;
     }
 }
 
@@ -200,7 +206,7 @@ mod tests {
         }
         let both = Solid::new(both).expect("closed");
         let folds = |mesh: &TriMesh| folded_faces(mesh, &TriangleBvh::new(mesh));
-        let careless = decimate(
+        let careless = decimate_with_care(
             both.mesh().clone(),
             &vec![MEAN_SHARE * 0.1; both.mesh().points.len()],
         );
