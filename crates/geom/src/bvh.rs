@@ -204,15 +204,37 @@ impl TriangleBvh {
     /// `origin` and follows the unit vector `direction`. Both sides of triangles count; triangles parallel to
     /// the ray do not.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3, limit_mm: f64) -> Option<(u32, f64)> {
-        let ray = Ray::new(origin, direction);
         let mut best: Option<(u32, f64)> = None;
-        let mut limit = limit_mm;
+        self.visit_hits(origin, direction, limit_mm, |face, t, limit| {
+            *limit = t;
+            best = Some((face, t));
+        });
+        best
+    }
+
+    /// Number of triangles that a ray meets.
+    pub fn n_hits(&self, origin: Vec3, direction: Vec3) -> usize {
+        let mut n = 0;
+        self.visit_hits(origin, direction, f64::INFINITY, |_, _, _| n += 1);
+        n
+    }
+
+    /// Calls `hit` with each triangle that a ray meets within the limit, mm, its distance, and the limit,
+    /// which it may lower.
+    fn visit_hits(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        mut limit_mm: f64,
+        mut hit: impl FnMut(u32, f64, &mut f64),
+    ) {
+        let ray = Ray::new(origin, direction);
         let mut stack = [0u32; 64];
         let mut top = usize::from(!self.faces.is_empty());
         while top > 0 {
             top -= 1;
             let node = &self.nodes[stack[top] as usize];
-            if !ray.meets(node.bounds, limit) {
+            if !ray.meets(node.bounds, limit_mm) {
                 continue;
             }
             if node.count == 0 {
@@ -223,14 +245,12 @@ impl TriangleBvh {
             }
             for i in node.triangles() {
                 if let Some(t) = ray_meets_triangle(self.corners[i], origin, direction)
-                    && t <= limit
+                    && t <= limit_mm
                 {
-                    limit = t;
-                    best = Some((self.faces[i], t));
+                    hit(self.faces[i], t, &mut limit_mm);
                 }
             }
         }
-        best
     }
 }
 

@@ -1,8 +1,8 @@
 //! Folds of a surface: faces that have material right in front of them.
 //!
 //! A closed, oriented surface can still fold back on itself by some micrometres, where rounding moved a point
-//! across a face. No count of edges sees that, but a ray does: in front of a sound face it leaves through the
-//! air, so the first face that it meets shows its outer side.
+//! across a face. No count of edges sees that, but a ray does: from a point in front of a sound face it meets
+//! an even number of faces.
 
 use rayon::prelude::*;
 
@@ -29,8 +29,7 @@ pub fn folded_faces(mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
         let origin = mesh.face_center(face) + IN_FRONT_MM * normal;
         DIRECTIONS.into_iter().all(|along| {
             let along = along.normalize() * along.dot(normal).signum();
-            let first = bvh.first_hit(origin, along, f64::INFINITY);
-            first.is_some_and(|(hit, _)| mesh.double_area_vector(hit as usize).dot(along) > 0.0)
+            bvh.n_hits(origin, along) % 2 == 1
         })
     };
     let is_folded = |&face: &u32| {

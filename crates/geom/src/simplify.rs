@@ -4,8 +4,6 @@
 //! [`decimate_with_care`] keeps a mean of squared distances small. Here the distance itself is measured
 //! afterwards, both ways, and what is around points that moved too far is allowed to move less.
 
-use std::collections::HashSet;
-
 use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
@@ -24,6 +22,9 @@ const MOST_ROUNDS: usize = 12;
 /// the later rounds they stay, and their neighbours, too: what lies beside a point may move it.
 const GENTLE_ROUNDS: usize = 3;
 const GENTLER: f64 = 0.25;
+
+/// Distance up to which two folded faces are at the same place, mm.
+const SAME_PLACE_MM: f64 = 0.5;
 
 /// A solid with fewer triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,16 +111,19 @@ fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], share: f64, n_r
     }
 }
 
-/// Returns the faces of `few` that fold, without those that lie where the former mesh folds as well.
+/// Returns the faces of `few` that fold, without those at places where the former mesh folds as well.
 fn new_folds(few: &TriMesh, few_bvh: &TriangleBvh, mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
     let mut folds = folded_faces(few, few_bvh);
     if !folds.is_empty() {
-        let former: HashSet<u32> = folded_faces(mesh, bvh).into_iter().collect();
-        let nearest = |face: u32| {
-            bvh.nearest(few.face_center(face as usize), f64::INFINITY)
-                .map(|n| n.face)
+        let former = TriMesh {
+            points: mesh.points.clone(),
+            triangles: (folded_faces(mesh, bvh).into_iter())
+                .map(|f| mesh.triangles[f as usize])
+                .collect(),
         };
-        folds.retain(|&face| !nearest(face).is_some_and(|f| former.contains(&f)));
+        let former = TriangleBvh::new(&former);
+        let near_sq = SAME_PLACE_MM * SAME_PLACE_MM;
+        folds.retain(|&face| former.nearest(few.face_center(face as usize), near_sq).is_none());
     }
     folds
 }

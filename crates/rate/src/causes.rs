@@ -18,7 +18,8 @@ pub enum Cause {
         drop_m: f64,
         stress_mpa: f64,
         strength_mpa: f64,
-        most_mm: f64,
+        /// Thickness up to which a search found every wall too weak, mm.
+        as_weak_up_to_mm: Option<f64>,
     },
     TooThinToHollow {
         n_places: usize,
@@ -50,13 +51,13 @@ impl Diagnostic for Cause {
                 drop_m,
                 stress_mpa,
                 strength_mpa,
-                most_mm,
+                as_weak_up_to_mm,
             } => {
-                let thicker = if most_mm > thickness_mm {
-                    format!(", and walls up to {most_mm:.1} mm help little")
-                } else {
-                    String::new()
-                };
+                let thicker = as_weak_up_to_mm
+                    .filter(|most_mm| most_mm > thickness_mm)
+                    .map_or_else(String::new, |most_mm| {
+                        format!(", as do all walls up to {most_mm:.1} mm")
+                    });
                 let tell = if stress_mpa >= &(MUCH_TOO_WEAK * strength_mpa) {
                     Told::problem
                 } else {
@@ -65,8 +66,8 @@ impl Diagnostic for Cause {
                 tell(
                     "wall-too-weak",
                     format!(
-                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m: its stress is \
-                         {:.1} times the material's strength{thicker}; print it larger, or do not drop it",
+                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m{thicker}: its stress \
+                         is {:.1} times the material's strength; print it larger, or do not drop it",
                         stress_mpa / strength_mpa
                     ),
                 )
@@ -153,7 +154,7 @@ mod tests {
                 drop_m: 1.275,
                 stress_mpa: 131.0,
                 strength_mpa: 42.0,
-                most_mm: 3.0,
+                as_weak_up_to_mm: Some(3.0),
             },
             Cause::TooThinToHollow {
                 n_places: 120,
@@ -191,7 +192,7 @@ mod tests {
                 drop_m: 1.275,
                 stress_mpa,
                 strength_mpa: 42.0,
-                most_mm: 3.0,
+                as_weak_up_to_mm: Some(3.0),
             };
             wall.tell(&[]).severity
         };

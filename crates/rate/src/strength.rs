@@ -56,11 +56,9 @@ const RESOLUTION_MM: f64 = 0.05;
 const MOST_WITHOUT_BRACKET: usize = 4;
 /// Number of thicknesses tried after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless a thicker one helps
-/// or the limits forbid it. Equal to the thickness that is printed where nothing is computed.
+/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless the limits forbid it:
+/// that to which people hollow models. A thicker one would break, too, and weigh more.
 const USUAL_MM: f64 = 2.0;
-/// Ratio to the least stress of all walls up to which a thicker wall is not worth its material.
-const WORTH_MORE_WALL: f64 = 1.05;
 /// Points of the coarse mesh, which shows how the stress depends on the thickness.
 const COARSE_POINTS: f64 = 2000.0;
 /// Points of the fine mesh, whose stress counts; docs/notes/strength.md shows the effect of more.
@@ -245,10 +243,11 @@ pub struct Strength {
     pub most_mm: f64,
     /// Decisive stress with that thickness, MPa.
     pub stress_mpa: f64,
-    /// True where the stress exceeds the strength. After a search, the stress of every wall in the limits
-    /// then does, by more than the search resolves. The thickness is in that case the least that no thicker
-    /// one betters by much, but at least 2 mm, or `most_mm` where that is less.
+    /// True where the stress exceeds the strength.
     pub is_too_weak: bool,
+    /// True if a search found that the stress of every wall in the limits exceeds the strength. The thickness
+    /// found is then the usual one of 2 mm, or the nearest in the limits.
+    pub no_wall_bears: bool,
     /// All thicknesses tried, ascending, with the stress on the fine mesh as predicted from the coarse one.
     pub trials: Vec<Tried>,
     /// Decisive orientation: number of the fall, and the direction that is down in it.
@@ -303,7 +302,7 @@ impl Strength {
                     drop_m: params.drop_m,
                     stress_mpa: self.stress_mpa,
                     strength_mpa: params.material.strength_mpa,
-                    most_mm: self.most_mm,
+                    as_weak_up_to_mm: self.no_wall_bears.then_some(self.most_mm),
                 },
                 Vec::new(),
                 Some(self.at.to_array()),
@@ -429,6 +428,7 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     let found = fine.strength(found, is_too_weak, tried.iter().map(corrected).collect());
     Ok(Strength {
         most_mm: params.most_mm,
+        no_wall_bears: is_too_weak,
         ..found
     })
 }
@@ -447,11 +447,10 @@ fn estimate(
         insert(tried, coarse.worst(next_mm)?.trial);
     }
     ctx.check()?;
-    let found = choice(tried, limit_mpa);
-    let usual_mm = USUAL_MM.clamp(params.least_mm, params.most_mm);
-    if found.stress_mpa <= limit_mpa || found.thickness_mm >= usual_mm {
-        return Ok(found);
+    if let Some(thinnest) = tried.iter().find(|t| t.stress_mpa <= limit_mpa) {
+        return Ok(*thinnest);
     }
+    let usual_mm = USUAL_MM.clamp(params.least_mm, params.most_mm);
     if let Some(known) = tried.iter().find(|t| t.thickness_mm == usual_mm) {
         return Ok(*known);
     }
@@ -464,27 +463,6 @@ fn estimate(
 fn insert(tried: &mut Vec<Tried>, new: Tried) {
     let at = tried.partition_point(|t| t.thickness_mm < new.thickness_mm);
     tried.insert(at, new);
-}
-
-/// The thinnest wall of sufficient strength; where there is none, the thinnest that no thicker one betters by
-/// much.
-fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
-    let bearable_mpa = bearable_mpa(tried, limit_mpa);
-    tried
-        .iter()
-        .find(|t| t.stress_mpa <= bearable_mpa)
-        .copied()
-        .unwrap_or(tried[0])
-}
-
-/// The stress limit, MPa; where no wall stays below it, a little more than the least stress.
-fn bearable_mpa(tried: &[Tried], limit_mpa: f64) -> f64 {
-    let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
-    if least_mpa <= limit_mpa {
-        limit_mpa
-    } else {
-        WORTH_MORE_WALL * least_mpa
-    }
 }
 
 /// Computes the stress of a wall of a given thickness, mm.
@@ -507,7 +485,7 @@ pub fn stress(
 
 /// The thickness to try next, mm; `None` at the end. First both ends of the range. If even the thickest wall
 /// is too weak, a few between, since solid regions do not count. Then inside the bracket about the first
-/// thickness within [`bearable_mpa`], until that is narrow enough.
+/// thickness within the limit, until that is narrow enough.
 fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64> {
     let (thinnest, thickest) = (tried.first()?, tried.last()?);
     let is_bearable = tried.iter().any(|t| t.stress_mpa <= limit_mpa);
@@ -522,7 +500,6 @@ fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64>
             .max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0])))
             .map(|[a, b]| (a * b).sqrt());
     }
-    let limit_mpa = bearable_mpa(tried, limit_mpa);
     let first = tried.iter().position(|t| t.stress_mpa <= limit_mpa)?;
     let Some(below) = first.checked_sub(1) else {
         return (thinnest.thickness_mm > params.least_mm).then_some(params.least_mm);

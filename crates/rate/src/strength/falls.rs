@@ -98,6 +98,7 @@ impl Falls {
             most_mm: worst.trial.thickness_mm,
             stress_mpa: worst.trial.stress_mpa,
             is_too_weak,
+            no_wall_bears: false,
             trials: tried,
             decisive_fall: (case, self.down[case]),
             at: self.mesh.face_center(worst.triangle),

@@ -116,9 +116,14 @@ impl Wall {
                 limits.least_mm,
             );
             let (mm, most_mm) = (found.wanted_mm(), thinnest.most_mm);
+            let no_wall_bears = thinnest.no_wall_bears;
             choices = Some(found);
             if mm != thinnest.thickness_mm {
-                decided = decide(Some(mm))?.map(|chosen| Strength { most_mm, ..chosen });
+                decided = decide(Some(mm))?.map(|chosen| Strength {
+                    most_mm,
+                    no_wall_bears,
+                    ..chosen
+                });
             }
         }
         Ok(match decided {
