@@ -402,9 +402,10 @@ mod tests {
             (labels.len(), few.file_face.len()),
             (mesh.triangles.len(), mesh.triangles.len())
         );
+        // The border between the labels follows edges, so it is as ragged as the triangles are large.
         for (f, label) in labels.iter().enumerate() {
             let z = mesh.face_center(f).z;
-            assert_eq!(*label, i64::from(z > 20.0), "{z}");
+            assert!(*label == i64::from(z > 20.0) || (z - 20.0).abs() < 0.1, "{z}");
         }
         assert!(
             few.notes[0].contains(&format!("from {n_before} to ")),

@@ -66,8 +66,8 @@ impl Diagnostic for Cause {
                 tell(
                     "wall-too-weak",
                     format!(
-                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m{thicker}: its stress \
-                         is {:.1} times the material's strength; print it larger, or do not drop it",
+                        "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m{thicker}: its \
+                         stress is {:.1} times the material's strength; print it larger, or do not drop it",
                         stress_mpa / strength_mpa
                     ),
                 )

@@ -56,8 +56,8 @@ const RESOLUTION_MM: f64 = 0.05;
 const MOST_WITHOUT_BRACKET: usize = 4;
 /// Number of thicknesses tried after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless the limits forbid it:
-/// that to which people hollow models. A thicker one would break, too, and weigh more.
+/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless the limits forbid
+/// it: that to which people hollow models. A thicker one would break, too, and weigh more.
 const USUAL_MM: f64 = 2.0;
 /// Points of the coarse mesh, which shows how the stress depends on the thickness.
 const COARSE_POINTS: f64 = 2000.0;
