@@ -163,6 +163,18 @@ fn prev(h: HalfEdge) -> HalfEdge {
     Topology::next(Topology::next(h))
 }
 
+/// Square of the longest edge, mm².
+fn longest_sq([a, b, c]: [Vec3; 3]) -> f64 {
+    b.distance_squared(c)
+        .max(a.distance_squared(b))
+        .max(a.distance_squared(c))
+}
+
+/// Height of a triangle, as a share of its longest edge.
+fn shape_of([a, b, c]: [Vec3; 3]) -> f64 {
+    (b - a).cross(c - a).length() / longest_sq([a, b, c]).max(f64::MIN_POSITIVE)
+}
+
 impl Decimation {
     fn new(mesh: &TriMesh, tolerance_mm: &[f64], care: Care) -> Option<Self> {
         let topology = Topology::of_mesh(mesh)?;
@@ -304,13 +316,8 @@ impl Decimation {
             return f64::INFINITY;
         }
         let shape = |h: HalfEdge| {
-            let [a, b, c] =
-                [h, Topology::next(h), prev(h)].map(|h| self.points[self.start[h as usize] as usize]);
-            let longest_sq = a
-                .distance_squared(b)
-                .max(b.distance_squared(c))
-                .max(c.distance_squared(a));
-            (b - a).cross(c - a).length() / longest_sq.max(f64::MIN_POSITIVE)
+            let corners = [h, Topology::next(h), prev(h)].map(|h| self.start[h as usize]);
+            shape_of(corners.map(|v| self.points[v as usize]))
         };
         shape(h).min(shape(self.opposite[h as usize]))
     }
@@ -327,14 +334,9 @@ impl Decimation {
             let (b, c) = (self.points[b as usize], self.points[c as usize]);
             let (before, after) = ((b - p).cross(c - p), (b - at).cross(c - at));
             let (old, new) = (before.length(), after.length());
-            let longest_sq = |p: Vec3| {
-                b.distance_squared(c)
-                    .max(p.distance_squared(b))
-                    .max(p.distance_squared(c))
-            };
-            let height = |doubled_area: f64, p: Vec3| doubled_area / longest_sq(p);
+            let height = |doubled_area: f64, p: Vec3| doubled_area / longest_sq([p, b, c]);
             // The normal of a sliver says nothing about the surface.
-            let is_sliver = old < flat_mm * longest_sq(p).sqrt();
+            let is_sliver = old < flat_mm * longest_sq([p, b, c]).sqrt();
             let is_upright = match is_sliver {
                 true => mean.dot(after) > LEAST_MEAN_COS * new,
                 false => before.dot(after) > LEAST_COS * old * new,

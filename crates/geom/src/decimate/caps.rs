@@ -4,7 +4,7 @@
 //! triangle beyond: the two share the other diagonal afterwards. The surface moves by the cap's height at
 //! most.
 
-use super::{Decimation, HalfEdge, LEAST_COS, prev};
+use super::{Decimation, HalfEdge, LEAST_COS, prev, shape_of};
 use crate::Vec3;
 use crate::topology::Topology;
 
@@ -57,15 +57,9 @@ impl Decimation {
         }
         let at = |p: u32| self.points[p as usize];
         let doubled = |a: u32, b: u32, c: u32| (at(b) - at(a)).cross(at(c) - at(a));
-        let shape = |area: Vec3, [a, b, c]: [u32; 3]| {
-            let longest_sq = at(a)
-                .distance_squared(at(b))
-                .max(at(b).distance_squared(at(c)))
-                .max(at(c).distance_squared(at(a)));
-            area.length() / longest_sq.max(f64::MIN_POSITIVE)
-        };
+        let shape = |corners: [u32; 3]| shape_of(corners.map(at));
         let (cap, beyond) = (doubled(u, v, w), doubled(v, u, x));
-        let cap_shape = shape(cap, [u, v, w]);
+        let cap_shape = shape([u, v, w]);
         if cap_shape >= CAP_HEIGHT || cap.length() > limit_mm * at(u).distance(at(v)) {
             return false;
         }
@@ -73,7 +67,7 @@ impl Decimation {
         let is_upright = |area: Vec3| beyond.dot(area) > LEAST_COS * beyond.length() * area.length();
         let is_better = halves
             .iter()
-            .all(|&(area, corners)| is_upright(area) && shape(area, corners) > cap_shape);
+            .all(|&(area, corners)| is_upright(area) && shape(corners) > cap_shape);
         let has_edges = [u, v].iter().all(|&p| self.around(p).nth(3).is_some());
         is_better && has_edges && !self.around(w).any(|h| self.ends(h)[1] == x)
     }
