@@ -5,7 +5,6 @@ use shellock_geom::{TriMesh, Vec3, Volume};
 
 use super::folds::Fold;
 use super::hanging::largest_part;
-use super::limits::FOLD_MM2;
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -117,7 +116,7 @@ fn read_piece(piece: PatchId, mesh: &TriMesh, model: Option<&TriMesh>) -> Body {
         }
     }
     let fold = volume.as_ref().and_then(|_| Fold::of(&mesh));
-    if let Some(fold) = fold.filter(|fold| fold.area_mm2 > FOLD_MM2) {
+    if let Some(fold) = fold {
         defects.push(Finding::Folded {
             piece,
             area_mm2: fold.area_mm2,

@@ -34,8 +34,6 @@ pub const RUB_MM3: f64 = 0.45;
 pub const RUB_MM: f64 = 0.027;
 /// Least overlap with others that holds a pushed piece, mm³.
 pub const HOLD_MM3: f64 = 0.55;
-/// Greatest area of a piece's surface that may have material right in front of it, mm².
-pub const FOLD_MM2: f64 = 0.5;
 /// Necks that break: their width, mm, and the greatest volume that may hang on them, without its outermost
 /// layer, mm³. What hangs on a thinner neck may itself be too thin to be seen with the greater width.
 pub const NECKS: [(f64, f64); 2] = [(0.85, 4.5), (1.22, 10.0)];
