@@ -24,19 +24,23 @@ const DIRECTIONS: [Vec3; 3] = [
 /// Returns the faces of a closed mesh that have material 2 µm in front of their middle, in order. Faces of
 /// 0.01 mm² and less are left out. `bvh` is that of the mesh.
 pub fn folded_faces(mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
-    let is_in_material = |face: usize| {
-        let normal = mesh.face_normal(face);
-        let origin = mesh.face_center(face) + IN_FRONT_MM * normal;
-        DIRECTIONS.into_iter().all(|along| {
-            let along = along.normalize() * along.dot(normal).signum();
-            bvh.n_hits(origin, along) % 2 == 1
-        })
-    };
     let is_folded = |&face: &u32| {
-        mesh.double_area_vector(face as usize).length() > 2.0 * LEAST_MM2 && is_in_material(face as usize)
+        let is_large = mesh.double_area_vector(face as usize).length() > 2.0 * LEAST_MM2;
+        is_large && has_material_in_front(mesh, bvh, face, IN_FRONT_MM)
     };
     (0..mesh.triangles.len() as u32)
         .into_par_iter()
         .filter(is_folded)
         .collect()
+}
+
+/// Returns true if there is material at `distance` in front of the middle of `face`; `bvh` is that of the
+/// mesh.
+pub(crate) fn has_material_in_front(mesh: &TriMesh, bvh: &TriangleBvh, face: u32, distance: f64) -> bool {
+    let normal = mesh.face_normal(face as usize);
+    let origin = mesh.face_center(face as usize) + distance * normal;
+    DIRECTIONS.into_iter().all(|along| {
+        let along = along.normalize() * along.dot(normal).signum();
+        bvh.n_hits(origin, along) % 2 == 1
+    })
 }

@@ -3,14 +3,15 @@
 //! A defect is repaired if there is one right answer: duplicate points and triangles, triangles that face the
 //! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
 //! smaller than a hundredth of the size, points where the surface pinches itself, specks, walls inside a
-//! body, closed surfaces within others, parts that overlap, and a surface that crosses itself. A defect that
+//! body, closed surfaces within others, parts that overlap, a surface that crosses itself, and triangles that
+//! lie upside down on their neighbours. A defect that
 //! needs a decision about the shape is rejected with its place: larger holes, one-sided surfaces, and several
 //! separate bodies. Bodies that are inside out and overlap another are rejected, too, unless the owner says
 //! how to treat them.
 //!
 //! Each stage is a function from a draft to a draft, and a [`Repair`] if it changed something. A mesh that is
-//! a solid as read and does not cross itself gives exactly the result of [`crate::check::into_solid`], bit by
-//! bit.
+//! a solid as read and neither crosses itself nor folds gives exactly the result of
+//! [`crate::check::into_solid`], bit by bit.
 
 mod crossing;
 mod cut;
@@ -22,6 +23,7 @@ mod junctions;
 mod near;
 mod report;
 mod shells;
+mod unfold;
 mod walls;
 
 pub(crate) use crossing::crossing_faces;
@@ -95,11 +97,7 @@ pub fn repair_as(mesh: &TriMesh, mode: RepairMode, inside_out: InsideOut) -> Res
     if let Ok((solid, source_face)) = as_read {
         let crossings = crossings(solid.mesh());
         if crossings.count == 0 {
-            return Ok(Repaired {
-                solid,
-                source_face,
-                repairs: Vec::new(),
-            });
+            return Ok(without_folds(solid, source_face, mode));
         }
         if mode == RepairMode::Refuse {
             return Err(InputError::Crossing {
@@ -127,6 +125,23 @@ pub fn repair_as(mesh: &TriMesh, mode: RepairMode, inside_out: InsideOut) -> Res
             })
         }
         repaired => repaired,
+    }
+}
+
+/// Removes the folds of a solid that does not cross itself. A fold is no reason to refuse one.
+fn without_folds(solid: Solid, source: Vec<u32>, mode: RepairMode) -> Repaired {
+    let mut draft = Draft {
+        mesh: solid.into_mesh(),
+        source,
+    };
+    let repairs = match mode {
+        RepairMode::Refuse => None,
+        RepairMode::Repair | RepairMode::KeepLargest => unfold::turn_folds(&mut draft),
+    };
+    Repaired {
+        solid: Solid::new(draft.mesh).expect("flipped edges leave the surface closed"),
+        source_face: draft.source,
+        repairs: repairs.into_iter().collect(),
     }
 }
 
@@ -205,6 +220,7 @@ fn finish(
     if mode == RepairMode::KeepLargest {
         repairs.extend(shells::keep_largest(&mut draft));
     }
+    repairs.extend(unfold::turn_folds(&mut draft));
     let (solid, kept) = into_solid(&draft.mesh)?;
     let source_face = kept.iter().map(|&face| draft.source[face as usize]).collect();
     Ok(Repaired {

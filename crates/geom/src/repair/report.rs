@@ -60,6 +60,8 @@ pub enum RepairKind {
     Fused,
     /// Separated the surface at points and edges in which it touched itself.
     Parted,
+    /// Turned triangles the right way up that lay upside down on their neighbours.
+    Unfolded,
     /// Left out closed surfaces within the body.
     Filled {
         /// Total volume of these surfaces.
@@ -91,6 +93,7 @@ impl RepairKind {
             Self::United { .. } => "parts-united",
             Self::Fused => "bodies-united",
             Self::Parted => "points-parted",
+            Self::Unfolded => "folds-removed",
             Self::Filled { .. } => "cavities-filled",
             Self::Drained { .. } => "openings-closed",
             Self::LeftOut => "bodies-left-out",
@@ -114,6 +117,7 @@ impl RepairKind {
             Self::United { .. } => ("pair of triangles", "pairs of triangles"),
             Self::Fused => ("bodies", "bodies"),
             Self::Parted => ("point", "points"),
+            Self::Unfolded => ("triangle lay", "triangles lay"),
             Self::Filled { .. } => ("closed surface", "closed surfaces"),
             Self::Drained { .. } => ("opening was", "openings were"),
             Self::LeftOut => ("smaller body was", "smaller bodies were"),
@@ -148,6 +152,7 @@ impl RepairKind {
             }
             Self::Fused => format!("{subject}, some of which touch with their faces, were united"),
             Self::Parted => format!("the surface touched itself in {subject}; it was separated there"),
+            Self::Unfolded => format!("{subject} upside down on a neighbour and turned the right way up"),
             Self::Filled { volume } => {
                 let volume = Short(volume);
                 format!("{subject} inside the body, {volume} in volume, left out: pieces are hollow anyway")

@@ -1,5 +1,9 @@
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
 use super::*;
 use crate::samples::{ball, both, cube, cuboid, flip, unweld};
+use crate::topology::Topology;
 use crate::{Vec3, Volume};
 
 fn mend(mesh: &TriMesh) -> Repaired {
@@ -535,4 +539,93 @@ fn a_body_inside_out_beside_another_or_within_it_is_no_cutter() {
     // All of it is inside out, so it overlaps only itself.
     let all = flip(both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3)));
     assert_eq!(mend(&all).repairs[0].kind.code(), "body-turned");
+}
+
+/// A flat box of 20 × 20 × 5 with a point of its top moved across a diagonal: one triangle of the top lies
+/// upside down, `depth` above or below the others.
+fn folded_box(depth: f64) -> TriMesh {
+    let (low, high) = (-5.0, 0.0);
+    let corner = |x: f64, y: f64, z: f64| Vec3::new(x, y, z);
+    let points = vec![
+        corner(-10.0, -10.0, low),
+        corner(10.0, -10.0, low),
+        corner(10.0, 10.0, low),
+        corner(-10.0, 10.0, low),
+        corner(-10.0, -10.0, high),
+        corner(10.0, -10.0, high),
+        corner(10.0, 10.0, high),
+        corner(-10.0, 10.0, high),
+        // Belongs to the triangle above the diagonal from 4 to 6, and lies below it.
+        corner(2.0, -2.0, depth),
+    ];
+    let triangles = vec![
+        [0, 2, 1],
+        [0, 3, 2],
+        [0, 1, 5],
+        [0, 5, 4],
+        [1, 2, 6],
+        [1, 6, 5],
+        [2, 3, 7],
+        [2, 7, 6],
+        [3, 0, 4],
+        [3, 4, 7],
+        [4, 5, 6],
+        [4, 6, 8],
+        [6, 7, 8],
+        [7, 4, 8],
+    ];
+    TriMesh { points, triangles }
+}
+
+fn folded(mesh: &TriMesh) -> Vec<u32> {
+    crate::fold::folded_faces(mesh, &TriangleBvh::new(mesh))
+}
+
+#[test]
+fn a_triangle_upside_down_on_its_neighbour_is_turned_without_moving_a_point() {
+    for depth in [-1e-4, 1e-4] {
+        let mesh = folded_box(depth);
+        let before = into_solid(&mesh).unwrap().0;
+        assert_eq!(folded(&mesh).len(), 1, "at {depth}");
+        let repaired = repair(&mesh, RepairMode::Repair).unwrap();
+        let after = repaired.solid.mesh();
+        assert!(folded(after).is_empty(), "at {depth}");
+        assert_eq!(after.points, before.mesh().points);
+        assert!((after.signed_volume() - 2000.0).abs() < 1.0);
+        let kinds: Vec<(RepairKind, usize)> = repaired.repairs.iter().map(|r| (r.kind, r.count)).collect();
+        assert_eq!(kinds, [(RepairKind::Unfolded, 1)], "at {depth}");
+        // The flipped pair comes from the triangle that is seen.
+        assert_eq!(repaired.source_face[10], 10);
+        assert_eq!(repaired.source_face[11], 10);
+        assert_eq!(repair(&mesh, RepairMode::Refuse).unwrap().solid, before);
+    }
+}
+
+/// A cube of 40 with a grid on its sides, of which one point in the middle of a side moves along that side,
+/// out of its polygon.
+#[test]
+fn a_point_that_left_its_polygon_leaves_no_fold_wherever_it_went() {
+    let mut grid = Solid::new(cube(Vec3::splat(-20.0), 40.0)).unwrap();
+    for _ in 0..4 {
+        grid = crate::subdivide::halve_edges(&grid, &Topology::new(&grid), |_, _| true).0;
+    }
+    let top = |p: &Vec3| p.z == 20.0 && p.x.abs().max(p.y.abs()) < 15.0;
+    let inner: Vec<usize> = (0..grid.mesh().points.len())
+        .filter(|&v| top(&grid.mesh().points[v]))
+        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut n_folded = 0;
+    for _ in 0..200 {
+        let mut mesh = grid.mesh().clone();
+        let moved = inner[rng.random_range(0..inner.len())];
+        let mut by = |most: f64| rng.random_range(-most..most);
+        mesh.points[moved] += Vec3::new(by(5.0), by(5.0), by(5e-4));
+        n_folded += usize::from(!folded(&mesh).is_empty());
+        let repaired = repair(&mesh, RepairMode::Repair).unwrap();
+        let after = repaired.solid.mesh();
+        assert!(folded(after).is_empty(), "{:?}", mesh.points[moved]);
+        assert!((after.signed_volume() - 64e3).abs() < 0.1);
+        assert_eq!(repaired.source_face.len(), after.triangles.len());
+    }
+    assert!(n_folded > 100, "{n_folded}");
 }

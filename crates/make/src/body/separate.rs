@@ -44,6 +44,8 @@ const GAP_SHARE: f64 = 0.2;
 const CUT_TOLERANCE_MM: f64 = 0.02;
 const FREE_TOLERANCE_MM: f64 = 0.05;
 const TIGHT_CELLS: f64 = 1.2;
+/// Distance from the cut of a node that gets no gap, as a share of the gap.
+const CLOSED_SHARE: f32 = 0.25;
 /// Distance from the wall at which collars end, in cells, and the slope of that limit, field mm per mm.
 const LIMIT_CELLS: f32 = 1.8;
 const LIMIT_SLOPE: f32 = 5.0;
@@ -279,7 +281,7 @@ impl Splitter<'_> {
     fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
         let field: Vec<f32> = (0..g.len())
             .into_par_iter()
-            .map(|n| (sign * g[n] - self.gap_mm[n]).min(self.limits(n)))
+            .map(|n| self.inset(g, sign, n).min(self.limits(n)))
             .collect();
         // Corners are cut apart on the same side as in the other side's collar.
         let apart = if sign > 0.0 {
@@ -342,9 +344,30 @@ impl Splitter<'_> {
             }
         }
         field.par_iter_mut().enumerate().for_each(|(n, f)| {
-            *f = f.min(self.gap_mm[n] - sign * g[n]).min(self.limits(n));
+            *f = f.min(-self.inset(g, sign, n)).min(self.limits(n));
         });
         field
+    }
+
+    /// Distance of node `n` from the gap, positive on the wanted side.
+    ///
+    /// The gap lies between two materials. Where the field comes near zero and turns round, with the other
+    /// side's material nowhere around, a gap would be a slot that is thinner than a hair.
+    fn inset(&self, g: &[f32], sign: f32, n: usize) -> f32 {
+        let (own_mm, gap_mm) = (sign * g[n], self.gap_mm[n]);
+        let inset_mm = own_mm - gap_mm;
+        if inset_mm > 0.0 || own_mm <= 0.0 {
+            return inset_mm;
+        }
+        let is_others = |m: u32| {
+            let (m, thickness) = (m as usize, self.grid.thickness_mm as f32);
+            -sign * g[m] > self.gap_mm[m] && (0.0..thickness).contains(&self.grid.depth[m])
+        };
+        if self.grid.band.all_neighbours(n as u32).any(is_others) {
+            inset_mm
+        } else {
+            CLOSED_SHARE * gap_mm
+        }
     }
 
     /// Tolerance by which a collar may be simplified at `p`, mm, where `sign · g` is `h`: a small share of
