@@ -28,6 +28,7 @@ mod fragments;
 mod grid;
 mod separate;
 mod sheets;
+mod split;
 #[cfg(test)]
 mod tests;
 

@@ -4,10 +4,9 @@
 //! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
 //! smaller than a hundredth of the size, points where the surface pinches itself, specks, walls inside a
 //! body, closed surfaces within others, parts that overlap, a surface that crosses itself, and triangles that
-//! lie upside down on their neighbours. A defect that
-//! needs a decision about the shape is rejected with its place: larger holes, one-sided surfaces, and several
-//! separate bodies. Bodies that are inside out and overlap another are rejected, too, unless the owner says
-//! how to treat them.
+//! lie upside down on their neighbours. A defect that needs a decision about the shape is rejected with its
+//! place: larger holes, one-sided surfaces, and several separate bodies. Bodies that are inside out and
+//! overlap another are rejected, too, unless the owner says how to treat them.
 //!
 //! Each stage is a function from a draft to a draft, and a [`Repair`] if it changed something. A mesh that is
 //! a solid as read and neither crosses itself nor folds gives exactly the result of
@@ -139,7 +138,7 @@ fn without_folds(solid: Solid, source: Vec<u32>, mode: RepairMode) -> Repaired {
         RepairMode::Repair | RepairMode::KeepLargest => unfold::turn_folds(&mut draft),
     };
     Repaired {
-        solid: Solid::new(draft.mesh).expect("flipped edges leave the surface closed"),
+        solid: Solid::new(draft.mesh).expect("flips and collapses leave the surface closed"),
         source_face: draft.source,
         repairs: repairs.into_iter().collect(),
     }

@@ -30,29 +30,32 @@ const MOVE_SHARE: f64 = 5e-4;
 /// Turns triangles the right way up that lie upside down on their neighbours. Folds stay where that would
 /// move the surface too far, and all of them stay where the surface would cross itself.
 pub(super) fn turn_folds(draft: &mut Draft) -> Option<Repair> {
-    let mut unfolded = draft.clone();
     let diagonal = draft.mesh.bounds().diagonal();
-    let (mut count, mut at) = (0, None);
+    let near = NEAR_SHARE * diagonal;
+    let mut next = folds(&draft.mesh, near);
+    let at = draft.mesh.face_center(next.as_ref()?.1[0] as usize);
+    let (mut unfolded, mut count) = (draft.clone(), 0);
     for _ in 0..MOST_ROUNDS {
-        let topology = Topology::of_mesh(&unfolded.mesh)?;
-        let folded = folds(&unfolded.mesh, &topology, NEAR_SHARE * diagonal);
-        let Some(&first) = folded.first() else { break };
-        at.get_or_insert(unfolded.mesh.face_center(first as usize));
+        let Some((topology, folded)) = next else { break };
         let n_turned = Turning::new(&mut unfolded, topology, diagonal).turn(&folded);
         if n_turned == 0 {
             break;
         }
         count += n_turned;
+        next = folds(&unfolded.mesh, near);
     }
-    let at = at.filter(|_| count > 0 && crossings(&unfolded.mesh).count <= crossings(&draft.mesh).count)?;
+    if count == 0 || crossings(&unfolded.mesh).count > crossings(&draft.mesh).count {
+        return None;
+    }
     *draft = unfolded;
     let kind = RepairKind::Unfolded;
     Some(Repair { kind, count, at })
 }
 
-/// Triangles that lie upside down: turned from a neighbour by more than 90°, with material within `near` in
-/// front of them; in order.
-fn folds(mesh: &TriMesh, topology: &Topology, near: f64) -> Vec<u32> {
+/// Triangles that lie upside down, in order, with the topology of their surface: turned from a neighbour by
+/// more than 90°, with material within `near` in front of them. `None` if there are none.
+fn folds(mesh: &TriMesh, near: f64) -> Option<(Topology, Vec<u32>)> {
+    let topology = Topology::of_mesh(mesh)?;
     let is_turned = |face: u32| {
         let normal = mesh.double_area_vector(face as usize);
         let from = |other: u32| mesh.double_area_vector(other as usize).dot(normal);
@@ -67,7 +70,7 @@ fn folds(mesh: &TriMesh, topology: &Topology, near: f64) -> Vec<u32> {
         let tree = TriangleBvh::new(mesh);
         turned.retain(|&face| has_material_in_front(mesh, &tree, face, near));
     }
-    turned
+    (!turned.is_empty()).then_some((topology, turned))
 }
 
 /// A change of the triangulation.
