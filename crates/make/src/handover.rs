@@ -9,12 +9,6 @@ use crate::piece::{Finished, FinishedJoint, PressFit};
 impl Finished {
     /// Converts pieces and places to those of the kit. The meshes were already turned, before rounding.
     pub fn hand_over(self, to: &Handover) -> Self {
-        let joint = |j: FinishedJoint| FinishedJoint {
-            male: to.piece(j.male),
-            female: to.piece(j.female),
-            at: to.turn().apply(j.at),
-            ..j
-        };
         let fit = |f: PressFit| PressFit {
             piece: to.piece(f.piece),
             at: to.at(f.at),
@@ -23,8 +17,20 @@ impl Finished {
         let meshes: Vec<TriMesh> = to.in_order(self.meshes.as_slice());
         Self {
             meshes: meshes.into_iter().collect(),
-            joints: self.joints.into_iter().map(joint).collect(),
+            joints: self.joints.into_iter().map(|joint| joint.hand_over(to)).collect(),
             press_fits: self.press_fits.into_iter().map(fit).collect(),
+        }
+    }
+}
+
+impl FinishedJoint {
+    /// Converts pieces and place to those of the kit.
+    pub fn hand_over(self, to: &Handover) -> Self {
+        Self {
+            male: to.piece(self.male),
+            female: to.piece(self.female),
+            at: to.turn().apply(self.at),
+            ..self
         }
     }
 }

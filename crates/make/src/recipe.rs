@@ -106,6 +106,24 @@ pub fn make_parts(ctx: &Ctx, recipe: &Recipe<'_>) -> Result<Parts, MakeError> {
     })
 }
 
+impl Parts {
+    /// Pairs of pieces whose connectors are too short to hold them together, as a lesson for later plans;
+    /// `sizes` are those of the division.
+    pub fn weak_joints(&self, handover: &Handover, sizes: &ConnectorSizes) -> Option<Lesson> {
+        let rooms: Vec<SeamRoom> = self
+            .rooms
+            .iter()
+            .map(|room| room.clone().hand_over(handover))
+            .collect();
+        let joints: Vec<FinishedJoint> = self
+            .connectors
+            .joints()
+            .map(|joint| joint.hand_over(handover))
+            .collect();
+        weak_joints(handover, &handover.sizes(sizes), &rooms, &joints)
+    }
+}
+
 /// Joins the parts of a plan to finished meshes. Also returns the room for connectors on each seam.
 ///
 /// Warns of a key without ribs, a notch or a number, of places that press on purpose, and of seams without a

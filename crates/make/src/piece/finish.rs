@@ -122,6 +122,11 @@ impl Connectors {
             .flat_map(|made| contacts(params, &made.run))
             .collect()
     }
+
+    /// One joint a run.
+    pub fn joints(&self) -> impl Iterator<Item = FinishedJoint> {
+        self.0.iter().map(joint)
+    }
 }
 
 /// Joins connectors to their bodies and cuts off what comes too near to other pieces. Gives a key its detents
@@ -132,9 +137,9 @@ pub fn make(
     grid: &ShellGrid,
     shell: &ShellBodies,
     plan: &LatticePlan,
-    Connectors(carved): &Connectors,
+    connectors: &Connectors,
 ) -> Result<Finished, PieceError> {
-    let params = finish.connector;
+    let (params, carved) = (finish.connector, &connectors.0);
     let kept: Vec<Run> = carved.iter().map(|made| made.run.clone()).collect();
     ctx.stage("pieces", plan.steps.len())?;
     let mut pieces = unite(shell, carved);
@@ -153,7 +158,7 @@ pub fn make(
     }
     Ok(Finished {
         meshes: make_printable(ctx, finish, grid, plan, &pieces, &changes)?,
-        joints: carved.iter().map(joint).collect(),
+        joints: connectors.joints().collect(),
         press_fits,
     })
 }

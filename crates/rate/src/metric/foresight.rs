@@ -1,7 +1,7 @@
 //! Predicted play of the pieces of each plan that a search found, before any of them is simulated.
 
 use rayon::prelude::*;
-use shellock_assembly::motion::Contact;
+use shellock_assembly::motion::{Contact, LOOSE};
 use shellock_plan::interface::{Interface, pin_contacts, wall_contacts};
 use shellock_plan::{FoundPlan, LatticePlan, PlanParams, RankedPlan};
 use shellock_report::PatchId;
@@ -22,7 +22,25 @@ pub(super) const COST_SLACK: f64 = 0.25;
 const SURE_PLAY: f64 = 0.85;
 
 /// Share of the allowed play above which pieces surely rattle.
-const SURE_RATTLE: f64 = 1.2;
+const SURE_RATTLE: f64 = 1.05;
+
+/// Predicted play of each piece, as a share of the allowed play, where the runs of connectors are known.
+pub struct ExpectedPlay {
+    key: PatchId,
+    excess: Vec<f64>,
+}
+
+impl ExpectedPlay {
+    /// Pieces but the key that surely rattle, the loosest first.
+    pub fn rattlers(&self) -> Vec<PatchId> {
+        loosest_first(self.key, &self.excess, SURE_RATTLE)
+    }
+
+    /// Pieces but the key whose play no kit may have, the loosest first.
+    pub fn loose(&self) -> Vec<PatchId> {
+        loosest_first(self.key, &self.excess, LOOSE * SURE_RATTLE)
+    }
+}
 
 /// Relative difference of the widest play up to which plans count as alike.
 const PLAY_TIE: f64 = 0.05;
@@ -71,17 +89,21 @@ impl Foresight {
         foreseen(&self.model, plan, &contacts, clearance_mm, self.size_mm)
     }
 
-    /// Pieces but the key that surely rattle in a plan whose connectors touch at `joints`, the loosest first.
-    pub fn rattlers_with(&self, plan: &LatticePlan, joints: &[Contact]) -> Vec<PatchId> {
-        let excess = self.play_with(plan, joints).excess;
-        loosest_first(plan.key(), &excess)
+    /// Predicted play in a plan whose connectors touch at `joints`.
+    pub fn expected_play(&self, plan: &LatticePlan, joints: &[Contact]) -> ExpectedPlay {
+        ExpectedPlay {
+            key: plan.key(),
+            excess: self.play_with(plan, joints).excess,
+        }
     }
 
     /// Pieces but the key that surely rattle even in the plan whose loosest piece has the least play, the
     /// loosest first.
     pub fn rattlers(&self) -> Vec<PatchId> {
         let steadiest = self.steadiest();
-        steadiest.map_or_else(Vec::new, |(plan, excess)| loosest_first(plan.plan.key(), excess))
+        steadiest.map_or_else(Vec::new, |(plan, excess)| {
+            loosest_first(plan.plan.key(), excess, SURE_RATTLE)
+        })
     }
 
     /// The plan whose loosest piece has the least play, the first of equals, with the play of each piece as a
@@ -118,15 +140,14 @@ fn widest(excess: &[f64]) -> f64 {
     excess.iter().copied().fold(SURE_PLAY, f64::max)
 }
 
-/// Pieces but the key whose play is surely wider than allowed, the loosest first; `excess` is the share of
-/// the allowed play.
-fn loosest_first(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
+/// Pieces but the key with a wider play than `most`, the loosest first; play is a share of the allowed play.
+fn loosest_first(key: PatchId, excess: &[f64], most: f64) -> Vec<PatchId> {
     let excess = excess
         .iter()
         .enumerate()
         .map(|(i, excess)| (PatchId::from(i), *excess));
     let mut wide: Vec<(PatchId, f64)> = excess
-        .filter(|(piece, excess)| *excess > SURE_RATTLE && *piece != key)
+        .filter(|(piece, excess)| *excess > most && *piece != key)
         .collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
     wide.into_iter().map(|w| w.0).collect()

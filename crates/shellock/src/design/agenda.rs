@@ -74,8 +74,8 @@ pub(super) struct Allowance {
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
-    /// True if a kit may be given up before it is finished, for other pieces: another one is allowed then.
-    pub may_stop_kit: bool,
+    /// True if a kit may be given up before it is finished: another one is allowed then.
+    may_stop_kit: bool,
     /// Time to keep back for the kit while its plan is improved, s.
     pub kit_reserve_s: f64,
     /// Time without which the kit is not begun, s.
@@ -89,6 +89,11 @@ impl Allowance {
 
     pub fn is_allowed(&self, step: Step) -> bool {
         self.permit(step) == Permit::Yes
+    }
+
+    /// Returns true if a kit may be given up before it is finished, for the sake of a step.
+    pub fn may_stop_for(&self, step: Step) -> bool {
+        self.may_stop_kit && self.is_allowed(step)
     }
 
     /// An allowance of these steps alone.
@@ -275,7 +280,8 @@ impl Agenda {
         }
     }
 
-    /// True if a kit was given up before it was finished, since other pieces promised less play.
+    /// True if a kit was given up before it was finished, since other pieces or another plan promised less
+    /// play.
     pub fn has_stopped_kits(&self) -> bool {
         self.has_stopped
     }
@@ -339,9 +345,7 @@ impl Agenda {
             least_factor: self.least_factor(),
             may_end_climb: !self.is_wall_thick(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
-            may_stop_kit: self.may_stop
-                && self.n_kits + 1 < self.most_kits()
-                && self.permit(ctx, Step::JoinRattling) == Permit::Yes,
+            may_stop_kit: self.may_stop && self.n_kits + 1 < self.most_kits(),
             kit_reserve_s: self.clock.kit_reserve_s(),
             least_kit_s: self.clock.least_kit_s(),
         }
@@ -550,7 +554,7 @@ impl Agenda {
                 .clock
                 .is_too_late_for_trial(ctx, 0.0, self.share_of_next_way()),
             Step::Enlarge | Step::JoinPredicted | Step::JoinWeak => self.clock.is_too_late_for_change(ctx),
-            Step::LowerLoad => self.clock.left_s(ctx) <= 0.0,
+            Step::LowerLoad => self.clock.is_over(ctx),
         }
     }
 

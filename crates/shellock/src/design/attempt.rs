@@ -1,6 +1,6 @@
 //! One attempt: the plan of a trial, and the kit that is made of it.
 
-use shellock_assembly::motion::Contact;
+use shellock_make::Parts as KitParts;
 
 use super::agenda::{Allowance, Step};
 use super::division::{Division, revise};
@@ -13,9 +13,9 @@ use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
 use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams, Stand};
 use crate::plan::lesson::Lesson;
-use crate::plan::{FoundPlan, LatticePlan, PlanOutcome, PlanParams};
+use crate::plan::{FoundPlan, Handover, LatticePlan, PlanOutcome, PlanParams};
 use crate::segmentation::join;
-use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
+use crate::{Cancelled, Ctx, MakeError, PatchId, SegmentedSurface, key, metric, plan};
 
 /// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves
 /// the optimum of a koala in ten pieces, but not that of a bunny in twelve.
@@ -89,31 +89,24 @@ pub(super) fn make_kit(
         choice,
     };
     let learned = &mut setup.lessons;
-    // Pieces that rattle are known as soon as the connectors are.
-    let join_rattlers = |plan: &LatticePlan, joints: &[Contact]| {
-        let rattling = foresight.rattlers_with(plan, joints);
-        if rattling.is_empty() || !allowance.may_stop_kit {
-            return Ok(None);
-        }
-        Ok(join(
-            ctx,
-            &division.settings.segmentation,
-            &division.surface,
-            loosest_half(&rattling),
-        )?)
+    let instead = |handover: &Handover, parts: &KitParts| {
+        rather_than_finish(ctx, division, &foresight, (handover, parts), allowance)
     };
-    let found = match make(kit_ctx, recipe, join_rattlers) {
+    let found = match make(kit_ctx, recipe, instead) {
         Ok(Ok(kit)) => {
             parts.effort.kits += 1;
             learn(ctx, division, learned, kit, allowance)?
         }
-        Ok(Err(fewer)) => {
-            let change = Change::Divide(Step::JoinRattling, fewer, None);
-            Found {
-                is_stopped: true,
-                ..Found::nothing(Failure::of("pieces rattle")).with(Some(change))
+        Ok(Err(instead)) => Found {
+            is_stopped: true,
+            ..match instead {
+                Instead::Join(fewer) => {
+                    let change = Change::Divide(Step::JoinRattling, fewer, None);
+                    Found::nothing(Failure::of("pieces rattle")).with(Some(change))
+                }
+                Instead::Replan(lessons) => learn_and_remake(ctx, division, learned, &lessons, allowance)?,
             }
-        }
+        },
         // A piece that cannot take enough of its wall along costs only the plan.
         Err(DesignError::Make(MakeError::Body(BodyError::Blocked {
             piece,
@@ -135,6 +128,50 @@ pub(super) fn make_kit(
         is_hurried: is_hurried || found.end.as_ref().is_some_and(Kit::is_hurried),
         ..found
     })
+}
+
+/// Something that promises more than finishing a kit.
+enum Instead {
+    /// Makes the kit of fewer pieces.
+    Join(SegmentedSurface),
+    /// Makes the kit of another plan, with what the connectors of this one taught.
+    Replan(Vec<Lesson>),
+}
+
+/// Decides whether a kit is finished. Pieces that rattle are known as soon as the connectors are.
+fn rather_than_finish(
+    ctx: &Ctx,
+    division: &Division,
+    foresight: &Foresight,
+    (handover, parts): (&Handover, &KitParts),
+    allowance: &Allowance,
+) -> Result<Option<Instead>, DesignError> {
+    let plan = handover.found_plan();
+    let expected = foresight.expected_play(plan, &parts.contacts);
+    let (rattling, loose) = (expected.rattlers(), expected.loose());
+    if !rattling.is_empty()
+        && allowance.may_stop_for(Step::JoinRattling)
+        && let Some(fewer) = join(
+            ctx,
+            &division.settings.segmentation,
+            &division.surface,
+            loosest_half(&rattling),
+        )?
+    {
+        return Ok(Some(Instead::Join(fewer)));
+    }
+    if loose.is_empty() || !allowance.may_stop_for(Step::Remake) {
+        return Ok(None);
+    }
+    let mut lessons: Vec<Lesson> = parts
+        .weak_joints(handover, &division.sizes.sizes)
+        .into_iter()
+        .collect();
+    lessons.push(Lesson::FailedPlan {
+        plan: plan.clone(),
+        loose,
+    });
+    Ok(Some(Instead::Replan(lessons)))
 }
 
 /// Seeks the plan that a kit would be made of, without making it.
@@ -233,17 +270,27 @@ fn learn(
         let change = change.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
         Found::nothing(Failure::of("pieces rattle")).with(change)
     } else {
-        let lessons = kit.lessons();
-        learned.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
-        for lesson in &lessons {
-            learned.add(lesson);
-        }
-        another_plan(ctx, division, learned, (Step::Remake, &lessons), allowance)?
+        learn_and_remake(ctx, division, learned, &kit.lessons(), allowance)?
     };
     Ok(Found {
         end: Some(kit),
         ..found
     })
+}
+
+/// Learns from a kit that failed or was given up, and offers another one.
+fn learn_and_remake(
+    ctx: &Ctx,
+    division: &Division,
+    learned: &mut Learned,
+    lessons: &[Lesson],
+    allowance: &Allowance,
+) -> Result<Found<Kit>, DesignError> {
+    learned.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
+    for lesson in lessons {
+        learned.add(lesson);
+    }
+    another_plan(ctx, division, learned, (Step::Remake, lessons), allowance)
 }
 
 /// Offers another plan, which respects the lessons, or other pieces if no more plans are allowed.

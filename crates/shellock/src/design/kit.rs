@@ -1,7 +1,7 @@
 //! One kit: the finished pieces of a plan, and their verification.
 
-use shellock_assembly::motion::Contact;
 use shellock_geom::{Solid, TriMesh};
+use shellock_make::Parts;
 use shellock_report::words;
 
 use super::agenda::Grade;
@@ -13,7 +13,7 @@ use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
 use crate::piece::{FinishParams, FinishedJoint, PressFit};
 use crate::plan::lesson::{self, Lesson};
-use crate::plan::{Handover, LatticePlan, PlanProof};
+use crate::plan::{Handover, PlanProof};
 use crate::play::{KitPlay, Rattle};
 use crate::verify::{self, Assembly, Finding, Verification};
 use crate::{ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning};
@@ -159,12 +159,11 @@ pub(super) struct Recipe<'a> {
 }
 
 /// Makes and verifies the kit of one plan. `ctx` holds the warnings collected while planning. `change` sees
-/// the plan and the places where its connectors touch; what it returns is returned in place of a kit, and no
-/// pieces are finished.
+/// the plan and its parts; what it returns is returned in place of a kit, and no pieces are finished.
 pub(super) fn make<T>(
     ctx: Ctx<'_>,
     recipe: Recipe<'_>,
-    change: impl FnOnce(&LatticePlan, &[Contact]) -> Result<Option<T>, DesignError>,
+    change: impl FnOnce(&Handover, &Parts) -> Result<Option<T>, DesignError>,
 ) -> Result<Result<Kit, T>, DesignError> {
     let Recipe { division, choice, .. } = recipe;
     let (surface, settings) = (&division.surface, &division.settings);
@@ -188,7 +187,7 @@ pub(super) fn make<T>(
         key_slide: settings.plan.key.and(settings.plan.key_slide),
     };
     let parts = shellock_make::make_parts(&ctx, &of_pieces)?;
-    if let Some(changed) = change(handover.found_plan(), &parts.contacts)? {
+    if let Some(changed) = change(&handover, &parts)? {
         return Ok(Err(changed));
     }
     let made = shellock_make::join_parts(&ctx, &of_pieces, parts)?;

@@ -13,6 +13,9 @@ const SPREAD: f64 = 1.5;
 /// Share of the expected time that must be left where an attempt costs nothing: estimates may be wrong by a
 /// factor of two.
 const HOPE: f64 = 0.4;
+/// Work that may be done before the first kit, as a multiple of the job's limit of work: a job that ends
+/// without a kit was for nothing.
+const FIRST_KIT_FACTOR: f64 = 2.0;
 /// Shortest time that tells how fast the machine is, s.
 const LEAST_MEASURED_S: f64 = 0.3;
 /// Bounds of the machine's slowness, relative to the reference: what lies outside them is a wrong estimate.
@@ -74,6 +77,21 @@ impl Clock {
             Some([total_s, done_s]) => total_s - done_s,
             None => ctx.seconds_left(),
         }
+    }
+
+    /// Seconds in which a trial may begin: those that are left, and more of a limit of work before the first
+    /// kit.
+    fn left_to_begin_s(&self, ctx: &Ctx) -> f64 {
+        let more_s = match self.work_s {
+            Some([total_s, _]) if self.n_pieces == 0 => (FIRST_KIT_FACTOR - 1.0) * total_s,
+            _ => 0.0,
+        };
+        self.left_s(ctx) + more_s
+    }
+
+    /// True if nothing more may begin.
+    pub fn is_over(&self, ctx: &Ctx) -> bool {
+        self.left_to_begin_s(ctx) <= 0.0
     }
 
     /// Measures the first wall, which tells how fast the machine is if its thickness `is_sought`.
@@ -142,14 +160,14 @@ impl Clock {
     /// True if a thicker wall would end too late: all begins anew, so as much time must be left as the
     /// present wall has taken. The ways that follow have `reserved_s`.
     pub fn is_too_late_for_wall(&self, ctx: &Ctx, reserved_s: f64) -> bool {
-        let left_s = self.left_s(ctx) - reserved_s;
+        let left_s = self.left_to_begin_s(ctx) - reserved_s;
         let anew_s = self.slowness * (self.cost.wall_s + self.cost.division_s) + self.trial_s();
         2.0 * left_s < self.left_at_wall_s - reserved_s || self.is_unlikely(left_s, anew_s)
     }
 
     /// True if a change before a kit would end too late: another plan is sought, and then the kit is made.
     pub fn is_too_late_for_change(&self, ctx: &Ctx) -> bool {
-        let left_s = self.left_s(ctx);
+        let left_s = self.left_to_begin_s(ctx);
         let expected_s = self.slowness * self.cost.plan_s + self.trial_s();
         left_s <= 0.0 || self.is_unlikely(left_s, expected_s)
     }
@@ -157,7 +175,7 @@ impl Clock {
     /// True if another trial, which takes `share` of the usual time, would end too late. If there is no kit
     /// of this way yet, all is tried that may succeed.
     pub fn is_too_late_for_trial(&self, ctx: &Ctx, reserved_s: f64, share: f64) -> bool {
-        let left_s = self.left_s(ctx) - reserved_s;
+        let left_s = self.left_to_begin_s(ctx) - reserved_s;
         let factor = if self.slowest_s > 0.0 { SPREAD } else { HOPE };
         left_s < share * factor * self.trial_s() || left_s <= 0.0
     }
@@ -310,6 +328,7 @@ mod tests {
         let mut clock = Clock::of_work(100.0);
         clock.foresee(&ctx, COST);
         assert_eq!(clock.left_s(&ctx), 95.0);
+        assert!(!clock.is_too_late_for_trial(&ctx, 185.0, 1.0), "no kit was made");
         clock.count_trial(false);
         clock.begin_trial(&ctx);
         clock.count_trial(true);

@@ -61,7 +61,7 @@ fn kit_that_rattles() -> Report {
 
 /// Kit that is given up since its connectors leave too much play, if that is allowed; else it is finished.
 fn stopped(allowance: &Allowance) -> Report {
-    if !allowance.may_stop_kit {
+    if !allowance.may_stop_for(Step::JoinRattling) {
         return kit_that_rattles();
     }
     Report {
@@ -393,12 +393,14 @@ fn a_kit_is_given_up_only_if_another_one_may_follow() {
     // Two kits are allowed with the first key of the first way.
     for may_stop in [true, false] {
         let allowance = open.allowance(&ctx);
-        assert_eq!(allowance.may_stop_kit, may_stop);
+        assert_eq!(allowance.may_stop_for(Step::JoinRattling), may_stop);
         open.next(&ctx, &stopped(&allowance));
     }
     assert!(open.has_stopped_kits());
-    assert!(!agenda().without_stops().allowance(&ctx).may_stop_kit);
+    let steps = [Step::JoinRattling, Step::Remake];
+    let unstopped = agenda().without_stops().allowance(&ctx);
+    assert!(steps.iter().all(|step| !unstopped.may_stop_for(*step)));
     let forbidden = vec![Step::JoinRattling];
     let mut labelled = Agenda::with(Clock::of_time(f64::INFINITY), ways.clone(), rounds, forbidden);
-    assert!(!labelled.allowance(&ctx).may_stop_kit);
+    assert!(!labelled.allowance(&ctx).may_stop_for(Step::JoinRattling));
 }
