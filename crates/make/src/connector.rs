@@ -17,7 +17,8 @@
 //! the separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin
 //! can leave along the separation direction and along no other. A run is made where its whole section is
 //! clear of walls and of other connectors, and is smaller where there is less room. A seam that has no such
-//! place gets a run that carving reduces. Runs are then shortened to the stretches that carving leaves whole.
+//! place gets a run that carving reduces. Runs are then shortened to the stretches that carving leaves whole,
+//! and their channels are closed at the ends (`connector::stop`).
 //!
 //! No such profile holds where a key slides along its seam. There the key's neighbour carries a straight
 //! tongue under the key's wall, and the key has a groove around it (`connector::rail`).
@@ -30,6 +31,7 @@ mod profile;
 mod rail;
 mod run;
 mod station;
+mod stop;
 mod taken;
 
 pub(crate) use contacts::contacts;
@@ -42,6 +44,7 @@ pub use run::{SeamRoom, runs};
 use shellock_plan::sizes::SizeChoice;
 use shellock_report::ParamProblem;
 pub use station::{RailPart, Run, RunShape, RunStation};
+pub(crate) use stop::{with_stops, without_thin_stops};
 
 /// Parameters of connectors. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]

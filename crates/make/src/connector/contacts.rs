@@ -8,7 +8,7 @@ use super::profile::Section;
 use super::station::{Run, RunShape, RunStation};
 
 /// Contacts of the male half with the female one at all stations of a run and between them: below the tip of
-/// the pin and on both of its sides, or on three sides of a rail's tongue.
+/// the pin, on both of its sides and at ends with a stop, or on three sides of a rail's tongue.
 pub(crate) fn contacts(params: &ConnectorParams, run: &Run) -> Vec<Contact> {
     let between = |w: &[RunStation]| {
         let middle = |a: Vec3, b: Vec3| a.midpoint(b);
@@ -19,10 +19,38 @@ pub(crate) fn contacts(params: &ConnectorParams, run: &Run) -> Vec<Contact> {
             ..w[0]
         }
     };
-    let middles = run.stations.windows(2).map(between);
+    let alike = |w: &&[RunStation]| w[0].shape == w[1].shape;
+    let middles = run.stations.windows(2).filter(alike).map(between);
     (run.stations.iter().copied().chain(middles))
         .flat_map(|station| at_station(params, run, &station))
+        .chain(at_stops(params, run))
         .collect()
+}
+
+/// Contacts of the ends of the pin with the stops of its channel.
+fn at_stops(params: &ConnectorParams, run: &Run) -> Vec<Contact> {
+    use RunShape::{Seam, Stop};
+    let at_end = |w: &[RunStation]| {
+        let (end, outwards) = match [w[0].shape, w[1].shape, w[2].shape] {
+            [Stop, Stop, Seam] => (w[2], -w[2].tangent),
+            [Seam, Stop, Stop] => (w[0], w[0].tangent),
+            _ => return Vec::new(),
+        };
+        let Some(pin) = Section::at(params, &end).male[0] else {
+            return Vec::new();
+        };
+        let face = end.n.cross(end.s).normalize_or_zero();
+        let contact = |s: f64| Contact {
+            a: run.male,
+            b: run.female,
+            point: end.place(0.5 * (pin.n0 + pin.n1), s),
+            normal: face * face.dot(outwards).signum(),
+            gap_mm: end.clearance_mm,
+            area_mm2: 0.0,
+        };
+        vec![contact(pin.s0), contact(0.1 * pin.s0)]
+    };
+    run.stations.windows(3).flat_map(at_end).collect()
 }
 
 fn at_station(params: &ConnectorParams, run: &Run, station: &RunStation) -> Vec<Contact> {
@@ -36,7 +64,7 @@ fn at_station(params: &ConnectorParams, run: &Run, station: &RunStation) -> Vec<
         .normalize_or_zero();
     // Coordinates along n and ŝ, and the direction that the face looks.
     let faces = match station.shape {
-        RunShape::Seam => vec![
+        RunShape::Seam | RunShape::Stop => vec![
             ([middle(pin.n0, pin.n1), pin.s0], -up),
             ([pin.n0, pin.s0], -station.n),
             ([pin.n0, 0.1 * pin.s0], -station.n),

@@ -23,7 +23,7 @@ type Outline = Vec<[f64; 2]>;
 /// Bevel of the pin's tip and of the channel's lower edges, in connector sizes, so that the pin finds its
 /// channel and hands find no sharp edge. Chosen by eye.
 const BEVEL_SIZES: f64 = 0.1;
-/// Distance that the stop of a rail keeps from the faces of the groove that it fills, mm.
+/// Distance that stops keep from the faces of the channel or groove that they fill, mm.
 const INSIDE_MM: f64 = 0.01;
 /// Greatest overhang that an end keeps, mm, and margin of its cut around the end's section, mm: where a run
 /// is bent, it overhangs its end beside that section.
@@ -47,8 +47,16 @@ pub(crate) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Vol
     let mut solids = Vec::new();
     for part in 0..sections[0].len() {
         // A part that some sections lack becomes several solids.
+        let inside: Vec<RunStation>;
+        let along = match part {
+            0 => &stations,
+            _ => {
+                inside = inside_ends(&stations);
+                &inside
+            }
+        };
         let line: Vec<(&RunStation, &Option<Outline>)> =
-            stations.iter().zip(sections.iter().map(|s| &s[part])).collect();
+            along.iter().zip(sections.iter().map(|s| &s[part])).collect();
         for stretch in line.split(|(_, outline)| outline.is_none()) {
             let present = stretch
                 .iter()
@@ -68,9 +76,24 @@ pub(crate) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Vol
     half.subtract(&Volume::union_all(beyond.into_iter().flatten().collect()))
 }
 
+/// The stations of an open run with its ends a little nearer together.
+fn inside_ends(stations: &[RunStation]) -> Vec<RunStation> {
+    let mut moved = stations.to_vec();
+    let last = moved.len() - 1;
+    let along = moved[0].tangent;
+    moved[0].point += INSIDE_MM * along;
+    let along = moved[last].tangent;
+    moved[last].point -= INSIDE_MM * along;
+    moved
+}
+
 /// Space beyond a run's end, where sections that lean along the seam would overhang it with a sharp edge;
-/// `outwards` is the tangent that leads out of the run. `None` where sections stand straight.
+/// `outwards` is the tangent that leads out of the run. `None` where sections stand straight, and at a stop,
+/// which would lose its thickness.
 fn overhang(params: &ConnectorParams, end: &RunStation, outwards: Vec3) -> Option<Volume> {
+    if end.shape == RunShape::Stop {
+        return None;
+    }
     let around = Section::at(params, end).bounds().grown(ASIDE_MM);
     let (lean, up) = (end.s.dot(outwards), end.s.reject_from_normalized(outwards));
     let far_mm = (around.s0 * lean).max(around.s1 * lean) - ASIDE_MM * lean.abs();
@@ -110,16 +133,17 @@ fn outlines(section: &Section, station: &RunStation, half: Half) -> Vec<Option<O
     let bevel = BEVEL_SIZES * station.size_mm;
     match (half, station.shape) {
         (Half::Corner, _) => vec![section.corner.map(rectangle)],
-        (Half::Male, RunShape::Seam) => {
+        (Half::Male, RunShape::Seam | RunShape::Stop) => {
             vec![section.male[0].map(|pin| pin_outline(pin, section.male[1], bevel))]
         }
-        (Half::Female, RunShape::Seam) => {
-            let [bottom, far, near] = section.female;
+        (Half::Female, RunShape::Seam | RunShape::Stop) => {
+            let [bottom, far, near, filling] = section.female;
             vec![
                 bottom
                     .zip(far)
                     .zip(near)
                     .map(|((bottom, far), near)| channel_outline(bottom, far, near, bevel)),
+                filling.map(|filling| filling_outline(filling.grown(-INSIDE_MM), bevel)),
             ]
         }
         (Half::Male, RunShape::Rail(_)) => {
@@ -131,7 +155,7 @@ fn outlines(section: &Section, station: &RunStation, half: Half) -> Vec<Option<O
             ]
         }
         (Half::Female, RunShape::Rail(_)) => {
-            let [lip, hanger, stop] = section.female;
+            let [lip, hanger, _, stop] = section.female;
             let groove = lip.zip(hanger).map(|(lip, hanger)| groove_outline(lip, hanger));
             vec![groove, stop.map(|stop| rectangle(stop.grown(-INSIDE_MM)))]
         }
@@ -170,6 +194,18 @@ fn channel_outline(bottom: ProfileRect, far: ProfileRect, near: ProfileRect, bev
         [far.n1, bottom.s1],
         [far.n1, far.s1],
         [far.n0, far.s1],
+    ]
+}
+
+/// Filling of a channel, within its bevelled outer edges.
+fn filling_outline(filling: ProfileRect, bevel: f64) -> Outline {
+    vec![
+        [filling.n0, filling.s0 + bevel],
+        [filling.n0 + bevel, filling.s0],
+        [filling.n1 - bevel, filling.s0],
+        [filling.n1, filling.s0 + bevel],
+        [filling.n1, filling.s1],
+        [filling.n0, filling.s1],
     ]
 }
 

@@ -1,7 +1,7 @@
 //! Cross-section of a connector: rectangles of pin, foot and channel.
 
 use shellock_geom::Vec3;
-use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, PIN_DEPTH, PIN_WIDTH};
+use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, LEAST_PART_MM, PIN_DEPTH, PIN_WIDTH};
 
 use super::ConnectorParams;
 use super::station::{RailPart, RunShape, RunStation};
@@ -58,8 +58,8 @@ impl ProfileRect {
 pub struct Section {
     /// Pin below the seam; then, where the male leaves sideways, the foot that joins it to its body.
     pub male: [Option<ProfileRect>; 2],
-    /// Bottom, far wall and near wall of the channel.
-    pub female: [Option<ProfileRect>; 3],
+    /// Bottom, far wall and near wall of the channel; then what fills a closed end.
+    pub female: [Option<ProfileRect>; 4],
     /// Filling of the corner between a tongue and the edge of the wall that it hangs from, a slot as narrow
     /// as the clearance. Reaches beyond the wall's side of the seam.
     pub corner: Option<ProfileRect>,
@@ -67,9 +67,6 @@ pub struct Section {
 
 /// Angle between ŝ and the surface normal below which the pin is a tongue and needs a foot, rad: −40°.
 const TONGUE_ANGLE: f64 = -0.698;
-/// Least thickness of pins, channel walls and floors, tongues and lips, mm, at any size: two lines of a
-/// filament printer, twenty pixels of a resin printer.
-const LEAST_PART_MM: f64 = 1.0;
 /// Depth to which parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
 /// Depth to which the filling of a tongue's corner reaches into tongue and wall, mm.
@@ -87,6 +84,7 @@ impl Section {
     pub fn at(params: &ConnectorParams, station: &RunStation) -> Self {
         match station.shape {
             RunShape::Seam => Self::seam(station),
+            RunShape::Stop => Self::stop(station),
             RunShape::Rail(part) => Self::rail(params, station, part),
         }
     }
@@ -165,6 +163,7 @@ impl Section {
                     s0: floor,
                     s1: RAIL_ROOT_MM,
                 }),
+                None,
                 (!has_tongue).then_some(ProfileRect {
                     n0: LIP_GAP_MM,
                     n1: outer,
@@ -241,7 +240,29 @@ impl Section {
                     s0: floor,
                     s1: top_near,
                 }),
+                None,
             ],
+        }
+    }
+
+    /// Cross-section of a closed end of a channel: there is no pin, and its place is filled up to where the
+    /// pin's wall would be.
+    fn stop(station: &RunStation) -> Self {
+        let open = Self::seam(station);
+        let far = open.female[1];
+        let filling = Self::bounds_of(open.female.iter().flatten());
+        Self {
+            male: [None, None],
+            female: [
+                open.female[0],
+                far,
+                open.female[2],
+                far.map(|far| ProfileRect {
+                    s1: far.s1,
+                    ..filling
+                }),
+            ],
+            corner: None,
         }
     }
 }
@@ -305,6 +326,22 @@ mod tests {
     }
 
     #[test]
+    fn a_stop_fills_the_channel_at_every_angle_and_no_more() {
+        for (degrees, size_mm) in angles_and_sizes() {
+            let at = station(degrees, size_mm);
+            let (open, closed) = (Section::seam(&at), Section::stop(&at));
+            assert_eq!(open.female[..3], closed.female[..3]);
+            let [bottom, far, near] = [0, 1, 2].map(|i| open.female[i].unwrap());
+            let filling = closed.female[3].unwrap();
+            assert_eq!([filling.n0, filling.n1, filling.s0], [far.n0, near.n1, bottom.s0]);
+            assert!(
+                filling.s1 == far.s1 && filling.s1 <= -at.clearance_mm,
+                "at {degrees}°"
+            );
+        }
+    }
+
+    #[test]
     fn tongue_and_groove_of_a_rail_keep_the_keys_clearance_and_overlap_both_ways() {
         for (size_mm, key_clearance_mm) in [(2.0, 0.1), (2.5, 0.15), (4.0, 0.3)] {
             let params = ConnectorParams::default();
@@ -343,7 +380,8 @@ mod tests {
         for (degrees, size_mm) in angles_and_sizes() {
             let station = station(degrees, size_mm);
             for section in [
-                Section::at(&params, &station),
+                Section::seam(&station),
+                Section::stop(&station),
                 Section::rail(&params, &station, RailPart::Full),
             ] {
                 for part in section.male.iter().chain(&section.female).flatten() {

@@ -34,6 +34,8 @@ pub struct RunStation {
 pub enum RunShape {
     /// Pin and channel of a seam that the piece leaves across.
     Seam,
+    /// Closed end of such a channel, beyond the pin.
+    Stop,
     /// Tongue and groove of a seam that a key slides along; `n` points to the key, ŝ out of the surface.
     Rail(RailPart),
 }
@@ -83,7 +85,38 @@ impl Run {
 
     /// Returns true if the run is a rail of the key.
     pub fn is_rail(&self) -> bool {
-        self.stations[0].shape != RunShape::Seam
+        matches!(self.stations[0].shape, RunShape::Rail(_))
+    }
+
+    /// The station at a place of the run, in stations from the first, between its neighbours. Places beyond
+    /// the last station of a closed run go round it once more.
+    pub fn station_at(&self, at: f64) -> RunStation {
+        let last = self.stations.len() - 1;
+        let (at, turns) = if at > last as f64 {
+            (at - last as f64, 1.0)
+        } else {
+            (at, 0.0)
+        };
+        let turn_mm = self.stations[last].arc_mm - self.stations[0].arc_mm;
+        let i = (at.floor() as usize).min(last - 1);
+        let (a, b, t) = (&self.stations[i], &self.stations[i + 1], at - i as f64);
+        if t == 0.0 && turns == 0.0 {
+            return *a;
+        }
+        let between = |from: f64, to: f64| from + (to - from) * t;
+        let tangent = a.tangent.lerp(b.tangent, t).normalize_or_zero();
+        let s = a.s.lerp(b.s, t).normalize_or_zero();
+        RunStation {
+            point: a.point.lerp(b.point, t),
+            tangent,
+            n: a.n.lerp(b.n, t).reject_from_normalized(s).normalize_or_zero(),
+            s,
+            theta: between(a.theta, b.theta),
+            depth: between(a.depth, b.depth),
+            arc_mm: between(a.arc_mm, b.arc_mm) + turns * turn_mm,
+            size_mm: between(a.size_mm, b.size_mm),
+            ..*a
+        }
     }
 
     /// Gap between the two halves, mm.

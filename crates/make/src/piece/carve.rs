@@ -5,7 +5,7 @@ use shellock_assembly::LatticeDirection;
 use shellock_geom::{Aabb, Vec3, Volume};
 use shellock_report::PatchId;
 
-use crate::connector::{ConnectorParams, Half, ProfileRect, Run, RunStation, Section};
+use crate::connector::{ConnectorParams, Half, ProfileRect, Run, RunShape, RunStation, Section};
 
 /// Difference between the clearance and the growth of the socket, mm. The channel's section already keeps the
 /// clearance; the difference keeps faces from coinciding.
@@ -15,13 +15,15 @@ const SOCKET_SLACK_MM: f64 = 0.01;
 type Cell = [Vec3; 8];
 
 /// Convex cells of one half, grown by `grown_mm`: one for each part of the section between two stations.
-/// Every part grows on all sides, lengthwise at the run's ends.
+/// Every part grows on all sides, lengthwise at the half's ends.
 fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
-    let last = run.stations.len() - 1;
+    let has_part = |at: &RunStation| half == Half::Female || at.shape != RunShape::Stop;
+    let first = run.stations.iter().position(has_part).unwrap_or(0);
+    let last = run.stations.iter().rposition(has_part).unwrap_or(0);
     let ring = |(i, station): (usize, &RunStation)| {
         let section = Section::at(params, station);
         let lengthwise = match i {
-            0 => -grown_mm,
+            i if i == first => -grown_mm,
             i if i == last => grown_mm,
             _ => 0.0,
         };

@@ -9,7 +9,7 @@ use shellock_report::{Cancelled, Ctx, PatchId};
 use super::carve::{SweptVolume, subtract_sweeps};
 use super::trim::{self, Body, Left, Wall, sections_left};
 use crate::body::{ShellBodies, ShellGrid};
-use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_half};
+use crate::connector::{ConnectorParams, Half, Run, RunStation, Section, whole_half, with_stops};
 
 /// Depth to which connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
@@ -61,10 +61,17 @@ type HalfId = (usize, usize);
 
 impl Carver<'_> {
     /// Carves both halves of each run. Runs that lose a part of their section are shortened to the stretches
-    /// that lose nothing, and given up where no stretch is long enough.
+    /// that lose nothing, and given up where no stretch is long enough. Then stops close the ends of channels
+    /// where they lose nothing either.
     pub fn carve(&self, runs: &[Run]) -> Result<Vec<Carved>, Cancelled> {
         self.ctx.stage("connectors", self.plan.steps.len())?;
-        let mut made = self.carved(runs, &vec![true; runs.len()], true)?;
+        let open = self.shortened(self.carved(runs, &vec![true; runs.len()], true)?)?;
+        let closed: Vec<Run> = open.iter().map(|made| with_stops(&made.run)).collect();
+        self.shortened(self.carved(&closed, &vec![true; closed.len()], false)?)
+    }
+
+    /// Shortens runs to the stretches that carving left whole.
+    fn shortened(&self, mut made: Vec<Carved>) -> Result<Vec<Carved>, Cancelled> {
         for _ in 0..MOST_TRIMS {
             let mut next: Vec<(Run, Option<Carved>)> = Vec::new();
             for carved in made.drain(..) {

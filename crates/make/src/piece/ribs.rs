@@ -20,6 +20,9 @@ const TOP_MM: f64 = 0.15;
 const ROOT_MM: f64 = 0.2;
 /// Length over which both ends taper, mm.
 const LEAD_MM: f64 = 0.5;
+/// Sizes of ribs, relative to these lengths: smaller ones stand where the larger leave room, as on the short
+/// sides of connectors.
+const SCALES: [f64; 2] = [1.0, 0.6];
 /// Greatest number of ribs, and least distance between two, mm.
 const MOST: usize = 6;
 const APART_MM: f64 = 6.0;
@@ -62,6 +65,8 @@ struct Place {
     at: Vec3,
     normal: Vec3,
     gap_mm: f64,
+    /// Size of the rib, one of [`SCALES`].
+    scale: f64,
 }
 
 /// Ribs that press by `interference_mm` on the pieces around the key, spread over its seams; none where no
@@ -71,9 +76,11 @@ pub(super) fn ribs(
     seat: &Seat<'_>,
     depth: impl Fn(Vec3) -> f64,
 ) -> (Vec<PressFit>, Vec<Change>) {
-    let places = spread(places(seat, depth), |p| {
-        has_intended_press(seat, p, interference_mm)
-    });
+    let fits = |p: &Place| has_intended_press(seat, p, interference_mm);
+    let mut places = Vec::new();
+    for scale in SCALES {
+        spread(&mut places, candidates(seat, &depth, scale), fits);
+    }
     let fit = |p: &Place| PressFit {
         kind: PressFitKind::Rib,
         piece: seat.key,
@@ -114,16 +121,17 @@ fn has_intended_press(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> b
 /// Length of the way in over which a rib rubs, mm.
 fn travel_mm(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> f64 {
     let rubs = |t: &f64| {
-        let top = place.at + (t + 0.5 * LENGTH_MM - LEAD_MM) * seat.along;
+        let top = place.at + (t + place.scale * (0.5 * LENGTH_MM - LEAD_MM)) * seat.along;
         seat.others
             .first_hit(top, place.normal, place.gap_mm + interference_mm)
             .is_some()
     };
     let steps = (0..=(MOST_TRAVEL_MM / TRAVEL_STEP_MM) as usize).map(|i| i as f64 * TRAVEL_STEP_MM);
-    steps.rev().find(rubs).unwrap_or(0.0) + LENGTH_MM
+    steps.rev().find(rubs).unwrap_or(0.0) + place.scale * LENGTH_MM
 }
 
-fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
+/// Places with room for a rib of size `scale`.
+fn candidates(seat: &Seat<'_>, depth: &impl Fn(Vec3) -> f64, scale: f64) -> Vec<Place> {
     let gap = |p: Vec3, normal: Vec3| Some(seat.others.first_hit(p, normal, WIDEST_GAP_MM + ROOT_MM)?.1);
     let mut found = Vec::new();
     for face in 0..seat.mesh.triangles.len() {
@@ -142,14 +150,19 @@ fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
             let across = seat.along.cross(normal).normalize_or_zero();
             let corners = [(-0.5, -1.0), (-0.5, 1.0), (0.5, -1.0), (0.5, 1.0)];
             let goes_on = corners.into_iter().all(|(l, w)| {
-                let corner = at + l * LENGTH_MM * seat.along + w * FOOT_MM * across;
+                let corner = at + scale * (l * LENGTH_MM * seat.along + w * FOOT_MM * across);
                 // The ray starts inside the key, so that a side that leans over is seen too.
                 let apart = gap(corner - ROOT_MM * normal, normal).map(|mm| mm - ROOT_MM - gap_mm);
                 depth(corner) >= seat.least_depth_mm
                     && apart.is_some_and(|mm| (-NEARER_MM..FARTHER_MM).contains(&mm))
             });
             if goes_on {
-                found.push(Place { at, normal, gap_mm });
+                found.push(Place {
+                    at,
+                    normal,
+                    gap_mm,
+                    scale,
+                });
             }
         }
     }
@@ -173,15 +186,20 @@ fn grid_on([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
         .map(move |[u, v]| a + u * (b - a) + v * (c - a))
 }
 
-/// Chooses up to [`MOST`] of `places` that fit, each as far as possible from those before, the first as far
-/// as possible from the middle.
-fn spread(places: Vec<Place>, fits: impl Fn(&Place) -> bool) -> Vec<Place> {
+/// Adds places that fit to those `chosen`, up to [`MOST`] in all, each as far as possible from those before,
+/// the first as far as possible from the middle.
+fn spread(chosen: &mut Vec<Place>, places: Vec<Place>, fits: impl Fn(&Place) -> bool) {
     let middle = places.iter().map(|p| p.at).sum::<Vec3>() / places.len().max(1) as f64;
-    let mut apart_mm: Vec<f64> = places.iter().map(|p| p.at.distance(middle)).collect();
-    let mut chosen: Vec<Place> = Vec::new();
+    let to_chosen = |chosen: &[Place], p: &Place| {
+        let apart = chosen.iter().map(|other| p.at.distance(other.at));
+        apart.reduce(f64::min)
+    };
+    let apart = |p: &Place| to_chosen(&*chosen, p).unwrap_or_else(|| p.at.distance(middle));
+    let mut apart_mm: Vec<f64> = places.iter().map(apart).collect();
     for _ in 0..MOST_MEASURED {
         let farthest = (0..places.len()).max_by(|&i, &j| apart_mm[i].total_cmp(&apart_mm[j]).then(j.cmp(&i)));
-        let Some(best) = farthest.filter(|&i| chosen.is_empty() || apart_mm[i] >= APART_MM) else {
+        let is_far = |i: &usize| chosen.is_empty() || apart_mm[*i] >= APART_MM * places[*i].scale;
+        let Some(best) = farthest.filter(is_far) else {
             break;
         };
         if apart_mm[best] == f64::NEG_INFINITY || chosen.len() == MOST {
@@ -191,22 +209,13 @@ fn spread(places: Vec<Place>, fits: impl Fn(&Place) -> bool) -> Vec<Place> {
             apart_mm[best] = f64::NEG_INFINITY;
             continue;
         }
-        let at = places[best].at;
-        let is_first = chosen.is_empty();
-        for (mm, place) in apart_mm
-            .iter_mut()
-            .zip(&places)
-            .filter(|(mm, _)| **mm != f64::NEG_INFINITY)
-        {
-            *mm = if is_first {
-                place.at.distance(at)
-            } else {
-                mm.min(place.at.distance(at))
-            };
-        }
         chosen.push(places[best]);
+        for (mm, place) in apart_mm.iter_mut().zip(&places) {
+            if *mm != f64::NEG_INFINITY {
+                *mm = to_chosen(&*chosen, place).unwrap_or(0.0);
+            }
+        }
     }
-    chosen
 }
 
 /// A roof along the way out whose ridge is `height_mm` above the key's side.
@@ -214,9 +223,11 @@ fn rib(place: &Place, along: Vec3, height_mm: f64) -> Volume {
     let across = along.cross(place.normal).normalize_or_zero();
     let along = place.normal.cross(across);
     let mut points = Vec::new();
+    let (foot_mm, top_mm) = (place.scale * FOOT_MM, place.scale * TOP_MM);
+    let (length_mm, lead_mm) = (place.scale * LENGTH_MM, place.scale * LEAD_MM);
     for (height, half_width, half_length) in [
-        (-ROOT_MM, FOOT_MM, 0.5 * LENGTH_MM),
-        (height_mm, TOP_MM, 0.5 * LENGTH_MM - LEAD_MM),
+        (-ROOT_MM, foot_mm, 0.5 * length_mm),
+        (height_mm, top_mm, 0.5 * length_mm - lead_mm),
     ] {
         for (s, t) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
             points.push(place.at + s * half_width * across + t * half_length * along + height * place.normal);
@@ -307,6 +318,19 @@ mod tests {
         assert!(
             !fits.is_empty() && changes.iter().all(|c| c.volume.bounds().min.x > -0.1),
             "none on the narrow side"
+        );
+    }
+
+    #[test]
+    fn smaller_ribs_stand_where_sides_are_too_short_for_larger_ones() {
+        // Of the sides, 1.4 mm below the rim are left.
+        let (fits, changes) = ribs_of_a_block(8.6);
+        assert_eq!(fits.len(), MOST);
+        let height_mm = |c: &Change| c.volume.bounds().size().z;
+        assert!(
+            changes
+                .iter()
+                .all(|c| (height_mm(c) - SCALES[1] * LENGTH_MM).abs() < 1e-9)
         );
     }
 

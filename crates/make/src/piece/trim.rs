@@ -4,7 +4,7 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
 
-use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section};
+use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section, without_thin_stops};
 
 /// Distance between the sections that are looked at, mm.
 const STEP_MM: f64 = 0.5;
@@ -50,6 +50,17 @@ pub(super) struct Root {
     pub whole_mm: f64,
     /// Middle of the root.
     pub at: Vec3,
+}
+
+impl Root {
+    /// A root that is wide enough, where a half has no section.
+    fn none_needed(at: Vec3) -> Self {
+        Self {
+            width_mm: LEAST_ROOT_MM,
+            whole_mm: LEAST_ROOT_MM,
+            at,
+        }
+    }
 }
 
 /// The wall that a half hangs from.
@@ -146,17 +157,24 @@ pub(super) fn sections_left(
         let n_steps = (a.point.distance(b.point) / STEP_MM).ceil().max(1.0) as usize;
         for step in 0..n_steps {
             let t = (step as f64 + 0.5) / n_steps as f64;
-            let shares = sections[0].iter().zip(&sections[1]).filter_map(|(at_a, at_b)| {
-                let (at_a, at_b) = ((*at_a)?, (*at_b)?);
-                Some(share(points_between((a, at_a), (b, at_b), t)))
-            });
-            let station = station_at(run, i as f64 + t);
+            let both =
+                |(at_a, at_b): (&Option<ProfileRect>, &Option<ProfileRect>)| Some(((*at_a)?, (*at_b)?));
+            let of_both: Vec<_> = sections[0].iter().zip(&sections[1]).filter_map(both).collect();
+            let shares = of_both
+                .iter()
+                .map(|&(at_a, at_b)| share(points_between((a, at_a), (b, at_b), t)));
+            let station = run.station_at(i as f64 + t);
             let bounds = Section::bounds_of(sections.iter().flatten().flatten());
+            // Beyond its end a pin loses nothing.
+            let root = match of_both.is_empty() {
+                true => Some(Root::none_needed(station.point)),
+                false => wall.root(&station, bounds, [&whole, &carved]),
+            };
             all.push(Left {
                 at: i as f64 + t,
                 share: shares.fold(1.0, f64::min),
                 point: station.point,
-                root: wall.root(&station, bounds, [&whole, &carved]),
+                root,
             });
         }
     }
@@ -260,47 +278,16 @@ fn stretches(run: &Run, shares: &[(f64, f64)], least: f64) -> Vec<Run> {
 fn part_of(run: &Run, begin: f64, end: f64) -> Option<Run> {
     let inner = (begin.floor() as usize + 1)..(end.ceil() as usize);
     let places = std::iter::once(begin).chain(inner.map(|i| i as f64)).chain([end]);
-    let part = Run {
-        stations: places.map(|at| station_at(run, at)).collect(),
+    let part = without_thin_stops(Run {
+        stations: places.map(|at| run.station_at(at)).collect(),
         ..run.clone()
-    };
+    });
     let least_mm = part
         .stations
         .iter()
         .map(|at| at.size_mm)
         .fold(f64::INFINITY, f64::min);
     (part.length() >= SHORTEST_RUN_SIZES * least_mm).then_some(part)
-}
-
-/// The station at a place of a run, between its neighbours. Places beyond the last station of a closed run go
-/// round it once more.
-fn station_at(run: &Run, at: f64) -> RunStation {
-    let last = run.stations.len() - 1;
-    let (at, turns) = if at > last as f64 {
-        (at - last as f64, 1.0)
-    } else {
-        (at, 0.0)
-    };
-    let turn_mm = run.stations[last].arc_mm - run.stations[0].arc_mm;
-    let i = (at.floor() as usize).min(last - 1);
-    let (a, b, t) = (&run.stations[i], &run.stations[i + 1], at - i as f64);
-    if t == 0.0 && turns == 0.0 {
-        return *a;
-    }
-    let between = |from: f64, to: f64| from + (to - from) * t;
-    let tangent = a.tangent.lerp(b.tangent, t).normalize_or_zero();
-    let s = a.s.lerp(b.s, t).normalize_or_zero();
-    RunStation {
-        point: a.point.lerp(b.point, t),
-        tangent,
-        n: a.n.lerp(b.n, t).reject_from_normalized(s).normalize_or_zero(),
-        s,
-        theta: between(a.theta, b.theta),
-        depth: between(a.depth, b.depth),
-        arc_mm: between(a.arc_mm, b.arc_mm) + turns * turn_mm,
-        size_mm: between(a.size_mm, b.size_mm),
-        ..*a
-    }
 }
 
 #[cfg(test)]
@@ -362,11 +349,11 @@ mod tests {
         at.map(|at| Left {
             at,
             share: share(at),
-            point: station_at(run, at).point,
+            point: run.station_at(at).point,
             root: Some(Root {
                 width_mm: 1.0,
                 whole_mm: 1.0,
-                at: station_at(run, at).point,
+                at: run.station_at(at).point,
             }),
         })
         .collect()

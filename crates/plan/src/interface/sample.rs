@@ -7,6 +7,7 @@
 
 use shellock_assembly::LatticeDirection;
 use shellock_geom::Vec3;
+use shellock_mechanics::connector::{MOST_LEAN_OF_STOPS, n_stops};
 use shellock_report::PatchId;
 use shellock_surface::Seam;
 use shellock_surface::seam::rules::{SHARPEST_TURN, SHORTEST_RAIL_SIZES, SHORTEST_RUN_SIZES, end_gap_mm};
@@ -179,6 +180,27 @@ impl Line {
             last = Some(kind);
         }
         runs
+    }
+
+    /// Stops of a run of pins with connectors of `size_mm`: the sample at which the pin ends, and the unit
+    /// vector out of the run that its end faces. A run all round a loop has none.
+    pub fn stops(&self, run: &Run, way: Way, size_mm: f64, clearance_mm: f64) -> Vec<(usize, Vec3)> {
+        let is_round = self.is_loop && run.samples.len() == self.samples.len();
+        if run.kind == Kind::Rail || is_round {
+            return Vec::new();
+        }
+        let last = run.samples.len() - 1;
+        let stop = |(i, outwards): (usize, f64)| {
+            let tangent = outwards * self.samples[i].tangent;
+            let along = way.s.unit().dot(tangent);
+            let face = tangent - along * way.s.unit();
+            (along.abs() <= MOST_LEAN_OF_STOPS).then(|| (i, face.normalize_or_zero()))
+        };
+        [(run.samples[0], -1.0), (run.samples[last], 1.0)]
+            .into_iter()
+            .filter_map(stop)
+            .take(n_stops(run.swept_mm, size_mm, clearance_mm))
+            .collect()
     }
 
     /// Returns the kind of connector possible at each sample. None is possible beside a change of the male

@@ -94,9 +94,29 @@ fn pins(params: &PlanParams, interface: &Interface, plan: &LatticePlan, leaves: 
             let samples = places.map(|i| &line.samples[run.samples[i]]);
             let faces = samples.flat_map(|x| faces(run.kind, interface.size_mm, x, s, side));
             found.extend(faces.map(contact));
+            for (i, outwards) in line.stops(&run, way, interface.size_mm, gap_mm) {
+                found.extend(
+                    end_faces(run.kind, interface.size_mm, &line.samples[i], s, side, outwards).map(contact),
+                );
+            }
         }
     }
     found
+}
+
+/// Faces of the end of a pin that a stop holds, which looks `outwards`; as [`faces`] gives them.
+fn end_faces(
+    kind: Kind,
+    size_mm: f64,
+    x: &Sample,
+    s: LatticeDirection,
+    side: f64,
+    outwards: Vec3,
+) -> impl Iterator<Item = (bool, Vec3, Vec3)> {
+    let sides = faces(kind, size_mm, x, s, side);
+    // The faces beside the pin come in pairs, at its tip and at its root.
+    let between = move |i: usize, j: usize| (sides[i].0, sides[i].1.midpoint(sides[j].1), outwards);
+    [between(1, 3), between(2, 4)].into_iter()
 }
 
 /// Faces of the male half at a sample: true if it is the later piece's, a point, and the direction that the
@@ -135,11 +155,13 @@ fn faces(kind: Kind, size_mm: f64, x: &Sample, s: LatticeDirection, side: f64) -
 
 #[cfg(test)]
 mod tests {
-    use shellock_test_surfaces::{label, seams, sphere};
+    use shellock_assembly::push;
+    use shellock_test_surfaces::{label, level_seam, seams, sphere};
 
     use super::*;
     use crate::LatticeStep;
-    use crate::interface::contacts;
+    use crate::interface::sample::lines;
+    use crate::interface::{contact, contacts};
     use crate::sizes::ConnectorSizes;
 
     const LID: PatchId = PatchId(2);
@@ -198,5 +220,44 @@ mod tests {
             assert!(of_lid.iter().all(|normal| normal.z < 0.1), "{of_lid:?}");
             assert!(of_lid.iter().any(|normal| normal.z < -0.9), "{of_lid:?}");
         }
+    }
+
+    #[test]
+    fn stops_hold_a_pin_along_a_straight_seam_where_it_is_long_enough() {
+        let up = LatticeDirection::nearest(Vec3::Z);
+        let params = PlanParams::default();
+        let plan = LatticePlan {
+            steps: [1, 0]
+                .map(|piece: u32| LatticeStep {
+                    piece: PatchId(piece),
+                    separation: up,
+                })
+                .to_vec(),
+        };
+        let along = |length_mm: f64| {
+            let seam = level_seam(vec![Vec3::ZERO, length_mm * Vec3::X]);
+            let lines = lines(&params, 2.5, &seam, None);
+            let interface = contact(&params, &ConnectorSizes::uniform(2.5), &[(&seam, lines)]).unwrap();
+            let ends = pin_contacts(&params, std::slice::from_ref(&interface), &plan);
+            let ends = ends.iter().filter(|c| c.normal.x.abs() > 0.99);
+            let sides: Vec<f64> = ends.map(|c| c.normal.x * (c.point.x - 0.5 * length_mm)).collect();
+            assert!(
+                sides.iter().all(|mm| *mm > 0.0),
+                "ends look out of the run: {sides:?}"
+            );
+            let held = interface.hold(PatchId(0), up).map(|pushes| {
+                let holds = |(push, mm3): (&Vec3, &f32)| push.x.abs() > 0.99 && *mm3 > 0.0;
+                push::directions()
+                    .iter()
+                    .zip(&pushes[0])
+                    .filter(|x| holds(*x))
+                    .count()
+            });
+            (sides.len(), held.unwrap_or(0))
+        };
+        assert_eq!(along(40.0), (4, 2));
+        // Room for one stop, on a run that is too short to count.
+        assert_eq!(along(11.5), (2, 0));
+        assert_eq!(along(8.0), (0, 0));
     }
 }

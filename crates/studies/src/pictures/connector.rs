@@ -77,7 +77,7 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
     };
     let lean = match shape {
         RunShape::Rail(_) => 0.0,
-        RunShape::Seam => station.theta.max(0.0).tan(),
+        RunShape::Seam | RunShape::Stop => station.theta.max(0.0).tan(),
     };
     let gap = 0.5 * params.clearance_mm;
     let wall = |side: f64| {
