@@ -9,13 +9,14 @@
 //!   along ±n:  a side of the channel   (|m·n| − c) · pin depth
 //!   along −ŝ:  the floor               (−m·ŝ − c) · pin width
 //!   along +ŝ:  nothing
-//!   out of the end of a run: a stop    (m·u − c) · pin depth · pin width
 //! ```
 //!
 //! A rail under a seam along s holds along ±N alone. Walls resist as well if the later piece is pushed at the
 //! earlier one across a seam that does not lean.
 //!
-//! Limits: carving and obstructions shorten runs, which a single factor accounts for.
+//! Limits: carving and obstructions shorten runs, which a single factor accounts for. Stops at the ends of
+//! channels resist nothing here, since carving decides where they stand: plans that counted on them came out
+//! loose.
 
 use rayon::prelude::*;
 use shellock_assembly::LatticeDirection;
@@ -66,20 +67,8 @@ impl BlockingTable {
             if holds(order, s) {
                 for line in lines {
                     let runs = line.runs(way).into_iter().filter(|run| run.is_made(size_mm));
-                    for run in runs {
-                        for &i in &run.samples {
-                            add(params, size_mm, &line.samples[i], way, &pushes, &mut held);
-                        }
-                        for (i, outwards) in line.stops(&run, way, size_mm, params.clearance_mm) {
-                            add_stop(
-                                params,
-                                size_mm,
-                                (&line.samples[i], outwards),
-                                way,
-                                &pushes,
-                                &mut held,
-                            );
-                        }
+                    for i in runs.flat_map(|run| run.samples) {
+                        add(params, size_mm, &line.samples[i], way, &pushes, &mut held);
                     }
                 }
             }
@@ -137,30 +126,6 @@ fn add(
                 0.0
             };
             *held += LEFT_SHARE * (sides + walls) * x.length_mm;
-        }
-    }
-}
-
-/// Adds the hold of the stop at the end of a pin at `x`, which faces `outwards`, mm³.
-fn add_stop(
-    params: &PlanParams,
-    size_mm: f64,
-    (x, outwards): (&Sample, Vec3),
-    way: Way,
-    pushes: &[Vec3; N_PUSHES],
-    held: &mut [[f64; N_PUSHES]; 2],
-) {
-    let (gap, step) = (params.clearance_mm, push::length_mm(params.clearance_mm));
-    let role = if way.s.unit().dot(x.normal) >= 0.0 {
-        1.0
-    } else {
-        -1.0
-    };
-    let area_mm2 = PIN_DEPTH * size_mm * (PIN_WIDTH * size_mm - gap);
-    for (held, sign) in held.iter_mut().zip([1.0, -1.0]) {
-        for (held, &push) in held.iter_mut().zip(pushes) {
-            let male = role * sign * step * push;
-            *held += LEFT_SHARE * (male.dot(outwards) - gap).max(0.0) * area_mm2;
         }
     }
 }
