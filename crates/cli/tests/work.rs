@@ -10,8 +10,8 @@ use serde_json::Value;
 /// Share by which work may grow before the test fails.
 const MORE: f64 = 0.1;
 
-/// Slow test: it makes one kit of some seconds, the first. If more work is meant, or less was achieved, replace the counts
-/// in the file by those that the test prints.
+/// Slow test: it makes one kit of some seconds, the first. If more work is meant, or less was achieved,
+/// replace the counts in the file by those that the test prints.
 #[test]
 fn a_kit_takes_no_more_work_than_before() {
     let folder = tempfile::tempdir().unwrap();
