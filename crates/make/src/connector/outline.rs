@@ -172,40 +172,39 @@ fn pin_outline(pin: ProfileRect, foot: Option<ProfileRect>, bevel: f64) -> Outli
     let corners = foot.map_or([[pin.n1, low], [pin.n1, high], [pin.n1, pin.s1]], |foot| {
         [[pin.n1, foot.s0], [foot.n1, foot.s0], [foot.n1, foot.s1]]
     });
-    let tip = [
-        [pin.n0, pin.s0 + bevel],
-        [pin.n0 + bevel, pin.s0],
-        [pin.n1 - bevel, pin.s0],
-        [pin.n1, pin.s0 + bevel],
-    ];
-    tip.into_iter().chain(corners).chain([[pin.n0, pin.s1]]).collect()
+    bevelled_bottom(pin, bevel)
+        .into_iter()
+        .chain(corners)
+        .chain([[pin.n0, pin.s1]])
+        .collect()
 }
 
 /// Channel with bevelled outer edges.
 fn channel_outline(bottom: ProfileRect, far: ProfileRect, near: ProfileRect, bevel: f64) -> Outline {
-    vec![
-        [bottom.n0, bottom.s0 + bevel],
-        [bottom.n0 + bevel, bottom.s0],
-        [bottom.n1 - bevel, bottom.s0],
-        [bottom.n1, bottom.s0 + bevel],
+    let walls = [
         [near.n1, near.s1],
         [near.n0, near.s1],
         [near.n0, bottom.s1],
         [far.n1, bottom.s1],
         [far.n1, far.s1],
         [far.n0, far.s1],
-    ]
+    ];
+    bevelled_bottom(bottom, bevel).into_iter().chain(walls).collect()
 }
 
 /// Filling of a channel, within its bevelled outer edges.
 fn filling_outline(filling: ProfileRect, bevel: f64) -> Outline {
-    vec![
-        [filling.n0, filling.s0 + bevel],
-        [filling.n0 + bevel, filling.s0],
-        [filling.n1 - bevel, filling.s0],
-        [filling.n1, filling.s0 + bevel],
-        [filling.n1, filling.s1],
-        [filling.n0, filling.s1],
+    let top = [[filling.n1, filling.s1], [filling.n0, filling.s1]];
+    bevelled_bottom(filling, bevel).into_iter().chain(top).collect()
+}
+
+/// Lower corners of a rectangle, bevelled, from its side at `n0` to that at `n1`.
+fn bevelled_bottom(of: ProfileRect, bevel: f64) -> [[f64; 2]; 4] {
+    [
+        [of.n0, of.s0 + bevel],
+        [of.n0 + bevel, of.s0],
+        [of.n1 - bevel, of.s0],
+        [of.n1, of.s0 + bevel],
     ]
 }
 
