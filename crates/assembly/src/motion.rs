@@ -48,6 +48,10 @@ const MOST_GAPS: f64 = 500.0;
 /// Multiple of [`most_play`] from which a piece counts as loose.
 pub const LOOSE: f64 = 2.0;
 
+/// Multiple of [`most_play`] up to which a rattle is told, but not worth another kit: a maker feels no
+/// difference between 2 and 2.4 degrees, and another kit costs as much time as the first.
+pub const SLIGHT: f64 = 1.2;
+
 /// Play above which a piece counts as rattling, mm and degrees.
 ///
 /// The reference is 1 mm and 2° for a model of 150 mm and a clearance of 0.12 mm. Both values grow in

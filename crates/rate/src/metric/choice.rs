@@ -42,7 +42,7 @@ pub struct Holding {
     /// Load factors of the kit, by simulation without a print to compare.
     #[serde(default)]
     pub bears: Vec<LoadBorne>,
-    /// Predicted play of each piece from the plan: displacement, mm, and turn, degrees; zeros for the key.
+    /// Predicted play of each piece from the plan: displacement, mm, and turn, degrees.
     pub foreseen_play: Vec<[f64; 2]>,
     /// Ratio of the predicted play to the allowed play of each piece.
     pub foreseen_excess: Vec<f64>,

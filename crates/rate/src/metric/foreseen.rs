@@ -11,21 +11,23 @@
 //!       └────┘
 //! ```
 //!
-//! Limits: ribs are not known, so a key has no prediction.
+//! The key may slide on its way out as far as proofs assume. Limits: its ribs are not known; they can only
+//! make its play less.
 
 use shellock_assembly::motion::{Contact, farthest, most_play};
+use shellock_assembly::play::SLIDE_MM;
 use shellock_geom::{Aabb, Vec3};
 use shellock_plan::LatticePlan;
 use shellock_report::PatchId;
 
 use super::PlanModel;
 
-/// Predicted play of each piece except the key, and its ratio to the allowed play: at most 1 where allowed.
+/// Predicted play of each piece, and its ratio to the allowed play: at most 1 where allowed.
 pub struct Foreseen {
     /// Displacement of the middle of each piece's surface, mm, and turn, degrees. Each is no less than the
-    /// greatest along the coordinate axes and no more than √3 of that; zeros for the key.
+    /// greatest along the coordinate axes and no more than √3 of that.
     pub play: Vec<[f64; 2]>,
-    /// Ratio of each piece's play to the allowed play, in the same order; 0 for the key.
+    /// Ratio of each piece's play to the allowed play, in the same order.
     pub excess: Vec<f64>,
 }
 
@@ -61,15 +63,23 @@ fn plays(model: &PlanModel, plan: &LatticePlan, contacts: &[Contact]) -> Vec<[f6
     }
     let centers = centers(model);
     let key = plan.key();
-    let play = |(i, own): (usize, &Vec<Contact>)| {
-        let piece = PatchId::from(i);
-        if piece == key {
-            [0.0; 2]
-        } else {
-            farthest(piece, own, centers[i])
-        }
-    };
+    let at = centers[usize::from(key)];
+    of_piece[usize::from(key)].push(end_of_slide(plan, at));
+    let play = |(i, own): (usize, &Vec<Contact>)| farthest(PatchId::from(i), own, centers[i]);
     of_piece.iter().enumerate().map(play).collect()
+}
+
+/// Contact that ends the slide of a key whose middle is `at`, against the piece that is installed first.
+fn end_of_slide(plan: &LatticePlan, at: Vec3) -> Contact {
+    let key = plan.key();
+    Contact {
+        a: key,
+        b: plan.steps[0].piece,
+        point: at,
+        normal: plan.separation(key).unit(),
+        gap_mm: SLIDE_MM,
+        area_mm2: 0.0,
+    }
 }
 
 /// Centre of each part's surface, weighted by area, mm.

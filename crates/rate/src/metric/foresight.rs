@@ -1,7 +1,7 @@
 //! Predicted play of the pieces of each plan that a search found, before any of them is simulated.
 
 use rayon::prelude::*;
-use shellock_assembly::motion::{Contact, LOOSE};
+use shellock_assembly::motion::{Contact, LOOSE, SLIGHT};
 use shellock_plan::interface::{Interface, pin_contacts, wall_contacts};
 use shellock_plan::{FoundPlan, LatticePlan, PlanParams, RankedPlan};
 use shellock_report::PatchId;
@@ -21,9 +21,13 @@ pub(super) const COST_SLACK: f64 = 0.25;
 /// 1.2 times the predicted play.
 const SURE_PLAY: f64 = 0.85;
 
-/// Share of the allowed play above which pieces are expected to rattle. Where runs are known, finished pieces
-/// of a cat and a teddy have 0.9 to 1.1 times the predicted play; before that, runs may come out shorter.
-const SURE_RATTLE: f64 = 1.05;
+/// Share of the allowed play above which pieces of a plan are expected to rattle too much. It lies below
+/// [`SLIGHT`], since runs may come out shorter than planned.
+const LIKELY_RATTLE: f64 = 1.05;
+
+/// Margin of predictions above a limit where runs are known, as a factor. Finished pieces of a cat and a
+/// teddy have 0.9 to 1.1 times the play that is then predicted.
+const SURE: f64 = 1.05;
 
 /// Predicted play of each piece, as a share of the allowed play, where the runs of connectors are known.
 pub struct ExpectedPlay {
@@ -32,14 +36,14 @@ pub struct ExpectedPlay {
 }
 
 impl ExpectedPlay {
-    /// Pieces but the key that surely rattle, the loosest first.
+    /// Pieces but the key that surely rattle too much, the loosest first.
     pub fn rattlers(&self) -> Vec<PatchId> {
-        loosest_first(self.key, &self.excess, SURE_RATTLE)
+        loosest_first(self.key, &self.excess, SURE * SLIGHT)
     }
 
     /// Pieces but the key whose play no kit may have, the loosest first.
     pub fn loose(&self) -> Vec<PatchId> {
-        loosest_first(self.key, &self.excess, LOOSE * SURE_RATTLE)
+        loosest_first(self.key, &self.excess, SURE * LOOSE)
     }
 }
 
@@ -98,12 +102,12 @@ impl Foresight {
         }
     }
 
-    /// Pieces but the key that surely rattle even in the plan whose loosest piece has the least play, the
-    /// loosest first.
+    /// Pieces but the key that are expected to rattle too much even in the plan whose loosest piece has the
+    /// least play, the loosest first.
     pub fn rattlers(&self) -> Vec<PatchId> {
         let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| {
-            loosest_first(plan.plan.key(), excess, SURE_RATTLE)
+            loosest_first(plan.plan.key(), excess, LIKELY_RATTLE)
         })
     }
 

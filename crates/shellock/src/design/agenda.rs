@@ -27,6 +27,7 @@ use super::ways::{Input, Walls, Way, ways};
 use super::{Params, Rounds, Thickness, WallChoice};
 use crate::Ctx;
 use crate::metric::RESERVE;
+use crate::motion::SLIGHT;
 use crate::sizes::SizeChoice;
 
 /// Number of places at which a key is cut before a piece becomes the key: if the best place fails, others
@@ -128,9 +129,9 @@ pub(super) struct Grade {
     pub n_failures: usize,
     /// Largest play of a piece relative to what is allowed; 0 if none rattles.
     pub rattle: f64,
-    /// True if pieces rattle and nothing else is wrong.
+    /// True if pieces rattle more than slightly and nothing else is wrong.
     pub only_rattles: bool,
-    /// True if another piece than the key rattles.
+    /// True if another piece than the key rattles more than slightly.
     pub others_rattle: bool,
 }
 
@@ -153,7 +154,7 @@ impl Grade {
     }
 
     fn is_firm(&self) -> bool {
-        self.passes() && self.rattle == 0.0
+        self.passes() && self.rattle <= SLIGHT
     }
 }
 

@@ -11,6 +11,7 @@ use crate::body::{PatchDistances, ShellGrid};
 use crate::connector::SeamRoom;
 use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
+use crate::motion::SLIGHT;
 use crate::piece::{FinishParams, FinishedJoint, PressFit};
 use crate::plan::lesson::{self, Lesson};
 use crate::plan::{Handover, PlanProof};
@@ -90,9 +91,14 @@ impl Kit {
         (!loose.is_empty()).then(|| format!("it passes, but {} {verb}", words::pieces(&loose)))
     }
 
-    /// Returns true if the kit passed its verification and no piece rattles.
+    /// Returns true if the kit passed its verification and no piece rattles more than slightly.
     pub fn is_firm(&self) -> bool {
-        self.verification.has_passed() && self.rattles.is_empty()
+        self.verification.has_passed() && self.strong_rattles().next().is_none()
+    }
+
+    /// Rattles that are worth another kit, the loosest first.
+    fn strong_rattles(&self) -> impl Iterator<Item = &Rattle> {
+        self.rattles.iter().filter(|rattle| rattle.excess > SLIGHT)
     }
 
     /// Finished pieces and their plan, as an assembly of `model`.
@@ -110,14 +116,14 @@ impl Kit {
         self.verification.has_passed() && self.play.ways_out.is_none()
     }
 
-    /// Returns true if rattling is the only fault: a piece rattles, and either no check fails, or one fails
+    /// Returns true if rattling is the only fault: a piece rattles more than slightly, and either no check fails, or one fails
     /// and all findings are of play that is too wide.
     pub fn only_rattles(&self) -> bool {
         let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
         let n_failures = self.failures().len();
         let findings = &self.verification.findings;
         let is_all = n_failures == 0 || (n_failures == 1 && findings.iter().all(is_rattle));
-        is_all && !self.rattles.is_empty()
+        is_all && self.strong_rattles().next().is_some()
     }
 
     /// Returns the lessons of a kit that failed, in patches of its division. The last one rejects its plan.
@@ -126,10 +132,10 @@ impl Kit {
         lesson::of_kit(&self.verification, &self.handover, &self.surface, weak)
     }
 
-    /// Pieces other than the key that rattle, the loosest first. The key is left out because it is cut
-    /// where there is room for it.
+    /// Pieces other than the key that rattle more than slightly, the loosest first. The key is left out because
+    /// it is cut where there is room for it.
     pub fn rattling_pieces(&self) -> Vec<PatchId> {
-        let pieces = self.rattles.iter().map(|r| r.piece);
+        let pieces = self.strong_rattles().map(|r| r.piece);
         pieces.filter(|piece| *piece != self.plan.key()).collect()
     }
 
