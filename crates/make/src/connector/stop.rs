@@ -20,11 +20,11 @@ const LEAST_STEP_MM: f64 = 0.1;
 /// Share of its thickness that a stop must have.
 const LEAST_SHARE: f64 = 0.9;
 
-/// Returns the run with stops at its ends, as far as it is long enough. Rails and closed runs stay as they
-/// are.
+/// Returns the run with stops at its present ends only, as far as it is long enough. Rails and closed runs
+/// stay as they are.
 pub(crate) fn with_stops(run: &Run) -> Run {
-    let is_open = !run.is_loop() && run.stations.iter().all(|at| at.shape == RunShape::Seam);
-    if !is_open {
+    let has_ends = |at: &RunStation| matches!(at.shape, RunShape::Seam | RunShape::Stop);
+    if run.is_loop() || !run.stations.iter().all(has_ends) {
         return run.clone();
     }
     let distances = Distances::of(run);

@@ -16,8 +16,9 @@ const ROOT_MM: f64 = 0.4;
 /// Distance that halves end inside their own wall, mm. Sides in one plane with the wall would meet it in
 /// slivers, folds and slots that are thinner than a hair.
 const INSET_MM: f32 = 0.03;
-/// Rounds of shortening runs. What one round leaves is whole, so the second only mends ends.
-const MOST_TRIMS: usize = 2;
+/// Rounds of shortening runs. What one round leaves is whole, so later ones only mend ends. The first closes
+/// the new ends with stops; each further stop would take from the pin.
+const MOST_TRIMS: usize = 3;
 
 /// A run whose halves are carved: first the male one, then the female.
 #[derive(Clone)]
@@ -60,24 +61,19 @@ pub(super) struct Carver<'a> {
 type HalfId = (usize, usize);
 
 impl Carver<'_> {
-    /// Carves both halves of each run. Runs that lose a part of their section are shortened to the stretches
-    /// that lose nothing, and given up where no stretch is long enough. Then stops close the ends of channels
-    /// where they lose nothing either.
+    /// Carves both halves of each run, with stops at its ends. Runs that lose a part of their section are
+    /// shortened to the stretches that lose nothing, and given up where no stretch is long enough.
     pub fn carve(&self, runs: &[Run]) -> Result<Vec<Carved>, Cancelled> {
         self.ctx.stage("connectors", self.plan.steps.len())?;
-        let open = self.shortened(self.carved(runs, &vec![true; runs.len()], true)?)?;
-        let closed: Vec<Run> = open.iter().map(|made| with_stops(&made.run)).collect();
-        self.shortened(self.carved(&closed, &vec![true; closed.len()], false)?)
-    }
-
-    /// Shortens runs to the stretches that carving left whole.
-    fn shortened(&self, mut made: Vec<Carved>) -> Result<Vec<Carved>, Cancelled> {
-        for _ in 0..MOST_TRIMS {
+        let closed: Vec<Run> = runs.iter().map(with_stops).collect();
+        let mut made = self.carved(&closed, &vec![true; closed.len()], true)?;
+        for round in 0..MOST_TRIMS {
+            let anew = |run: Run| if round == 0 { with_stops(&run) } else { run };
             let mut next: Vec<(Run, Option<Carved>)> = Vec::new();
             for carved in made.drain(..) {
                 match carved.trimmed() {
                     None => next.push((carved.run.clone(), Some(carved))),
-                    Some(parts) => next.extend(parts.into_iter().map(|run| (run, None))),
+                    Some(parts) => next.extend(parts.into_iter().map(|run| (anew(run), None))),
                 }
             }
             // Shorter runs are in fewer ways, so what was whole stays so.
