@@ -87,7 +87,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let run = |args: &[&str]| shellock(dir.path(), args);
     let job = |threads: &str, out: &str| {
-        let job = "demo --figure vase --size 80 --pieces 6 --effort 20 --json --threads";
+        let job = "demo --figure vase --size 60 --pieces 4 --effort 20 --json --threads";
         run(&job.split(' ').chain([threads, "-o", out]).collect::<Vec<_>>())
     };
     let first = job("1", "one");
@@ -107,7 +107,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
 
     // The kit can be verified again from its files, and a missing piece is noticed.
     assert_eq!(
-        code(&run(&["figure", "vase", "--size", "80", "-o", "vase.stl"])),
+        code(&run(&["figure", "vase", "--size", "60", "-o", "vase.stl"])),
         0
     );
     assert_eq!(code(&run(&["verify", "one", "vase.stl"])), 0);

@@ -37,7 +37,7 @@ pub const QUICK: [Case; 3] = [
             "--figure",
             "dinosaur",
             "--size",
-            "60",
+            "50",
             "--pieces",
             "3",
             "--key",

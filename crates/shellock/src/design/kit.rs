@@ -116,8 +116,8 @@ impl Kit {
         self.verification.has_passed() && self.play.ways_out.is_none()
     }
 
-    /// Returns true if rattling is the only fault: a piece rattles more than slightly, and either no check fails, or one fails
-    /// and all findings are of play that is too wide.
+    /// Returns true if rattling is the only fault: a piece rattles more than slightly, and either no check
+    /// fails, or one fails and all findings are of play that is too wide.
     pub fn only_rattles(&self) -> bool {
         let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
         let n_failures = self.failures().len();
@@ -132,8 +132,8 @@ impl Kit {
         lesson::of_kit(&self.verification, &self.handover, &self.surface, weak)
     }
 
-    /// Pieces other than the key that rattle more than slightly, the loosest first. The key is left out because
-    /// it is cut where there is room for it.
+    /// Pieces other than the key that rattle more than slightly, the loosest first. The key is left out
+    /// because it is cut where there is room for it.
     pub fn rattling_pieces(&self) -> Vec<PatchId> {
         let pieces = self.strong_rattles().map(|r| r.piece);
         pieces.filter(|piece| *piece != self.plan.key()).collect()
