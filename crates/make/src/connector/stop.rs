@@ -20,8 +20,8 @@ const LEAST_STEP_MM: f64 = 0.1;
 /// Share of its thickness that a stop must have.
 const LEAST_SHARE: f64 = 0.9;
 
-/// Returns the run with stops at its present ends only, as far as it is long enough. Rails and closed runs
-/// stay as they are.
+/// Returns the run with stops at its two ends, as far as it is long enough. Former stops are removed. Rails
+/// and closed runs stay as they are.
 pub(crate) fn with_stops(run: &Run) -> Run {
     let has_ends = |at: &RunStation| matches!(at.shape, RunShape::Seam | RunShape::Stop);
     if run.is_loop() || !run.stations.iter().all(has_ends) {
@@ -228,6 +228,24 @@ mod tests {
         assert_eq!(n_stops(&run(least_mm - 0.01, 0.0)), 1);
         assert_eq!(n_stops(&run(4.0, 0.0)), 0);
         assert_eq!(n_stops(&run(14.0, 0.8)), 0);
+    }
+
+    #[test]
+    fn a_shortened_run_gets_stops_at_its_new_ends_and_keeps_none_within() {
+        let closed = with_stops(&run(14.0, 0.0));
+        for from in 0..4 {
+            let mut cut = closed.clone();
+            cut.stations.drain(..from);
+            let anew = with_stops(&cut);
+            let parts: Vec<&[RunStation]> = anew.stations.chunk_by(|a, b| a.shape == b.shape).collect();
+            let shapes: Vec<RunShape> = parts.iter().map(|part| part[0].shape).collect();
+            assert_eq!(shapes, [RunShape::Stop, RunShape::Seam, RunShape::Stop], "{from}");
+            let thickness_mm = |part: &[RunStation]| part[0].point.distance(part[part.len() - 1].point);
+            for stop in [parts[0], parts[2]] {
+                assert!((thickness_mm(stop) - STOP_MM).abs() < 1e-9, "{from}");
+            }
+            assert_eq!(anew.stations[0].point, cut.stations[0].point);
+        }
     }
 
     #[test]

@@ -62,6 +62,17 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
 }
 
 #[test]
+fn a_slight_rattle_is_worth_no_other_kit() {
+    let passing = |excess: f64| Kit {
+        rattles: kit_that_rattles(1, excess).rattles,
+        ..good()
+    };
+    let (slight, strong) = (passing(1.1), passing(1.3));
+    assert!(slight.is_firm() && !slight.only_rattles() && slight.rattling_pieces().is_empty());
+    assert!(!strong.is_firm() && strong.only_rattles() && strong.rattling_pieces() == [PatchId(1)]);
+}
+
+#[test]
 fn a_key_that_rattles_is_nobody_to_join() {
     assert_eq!(kit_that_rattles(2, 3.0).rattling_pieces(), []);
     assert!(

@@ -30,8 +30,8 @@ fn kit(n_failures: usize, rattle: f64) -> Report {
             n_pieces: N_PIECES,
             n_failures,
             rattle,
-            only_rattles: rattle > 0.0,
-            others_rattle: rattle > 0.0,
+            only_rattles: rattle > SLIGHT,
+            others_rattle: rattle > SLIGHT,
         }),
         ..Report::default()
     }
@@ -403,4 +403,10 @@ fn a_kit_is_given_up_only_if_another_one_may_follow() {
     let forbidden = vec![Step::JoinRattling];
     let mut labelled = Agenda::with(Clock::of_time(f64::INFINITY), ways.clone(), rounds, forbidden);
     assert!(!labelled.allowance(&ctx).may_stop_for(Step::JoinRattling));
+}
+
+#[test]
+fn a_job_ends_with_a_kit_that_rattles_slightly() {
+    let (trials, is_cut_short) = Story::new("slight rattle", |_, _, _| kit(0, 1.1)).run();
+    assert_eq!((trials.len(), trials[0].1, is_cut_short), (1, None, false));
 }
