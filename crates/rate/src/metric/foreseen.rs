@@ -96,3 +96,60 @@ fn centers(model: &PlanModel) -> Vec<Vec3> {
         .map(|(moment, area)| if area > 0.0 { moment / area } else { moment })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use shellock_assembly::LatticeDirection;
+    use shellock_plan::LatticeStep;
+    use shellock_plan::sizes::ConnectorSizes;
+    use shellock_test_surfaces::{label, sphere};
+
+    use super::*;
+    use crate::metric::MetricParams;
+
+    #[test]
+    fn a_key_that_only_its_way_out_leaves_free_slides_as_far_as_proofs_assume() {
+        let half = |p: Vec3| u32::from(p.z > 0.0);
+        let surface = label(sphere(4, Vec3::splat(40.0)), 2, half);
+        let model = PlanModel::new(&MetricParams::default(), &surface, &ConnectorSizes::default());
+        let step = |(piece, direction): (u32, Vec3)| LatticeStep {
+            piece: PatchId(piece),
+            separation: LatticeDirection::nearest(direction),
+        };
+        let plan = LatticePlan {
+            steps: [(0, Vec3::NEG_Z), (1, Vec3::Z)].map(step).to_vec(),
+        };
+        // Walls around the key at four places, a gap away on all sides but that of its way out.
+        let gap_mm = 0.1;
+        let around = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y];
+        let walls: Vec<Contact> = around
+            .iter()
+            .flat_map(|&at| around.into_iter().chain([Vec3::NEG_Z]).map(move |to| (at, to)))
+            .map(|(at, normal)| Contact {
+                a: PatchId(1),
+                b: PatchId(0),
+                point: 30.0 * at,
+                normal,
+                gap_mm,
+                area_mm2: 1.0,
+            })
+            .collect();
+        let [key_mm, _] = plays(&model, &plan, &walls)[1];
+        assert!(
+            (SLIDE_MM..=3f64.sqrt() * (SLIDE_MM + gap_mm)).contains(&key_mm),
+            "{key_mm}"
+        );
+        // A stop that is nearer than that is felt.
+        let stop = |x: f64| Contact {
+            point: Vec3::new(x, 0.0, 0.0),
+            normal: Vec3::Z,
+            ..walls[0]
+        };
+        let stopped = [walls.clone(), [-30.0, 30.0].map(stop).to_vec()].concat();
+        let [stopped_mm, _] = plays(&model, &plan, &stopped)[1];
+        assert!(stopped_mm < key_mm, "{stopped_mm} and {key_mm}");
+        // The other piece gets no such end: nothing ends its slide.
+        let [other_mm, _] = plays(&model, &plan, &walls)[0];
+        assert!(other_mm > 10.0 * key_mm, "{other_mm}");
+    }
+}
