@@ -9,7 +9,7 @@ use shellock_geom::contour::contour as dense;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::signed_distance::SignedDistance;
-use shellock_geom::simplify::simplify;
+use shellock_geom::simplify::{Reach, simplify};
 use shellock_geom::sweep::{Draft, Sweeper};
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_testkit::shapes::contoured_ball;
@@ -43,7 +43,7 @@ fn build_bvh(bencher: Bencher) {
 #[divan::bench]
 fn simplify_to_a_hundredth(bencher: Bencher) {
     let ball = ball();
-    bencher.bench(|| simplify(black_box(&ball), &[], 0.01));
+    bencher.bench(|| simplify(black_box(&ball), &[], Reach::everywhere(0.01)));
 }
 
 #[divan::bench]

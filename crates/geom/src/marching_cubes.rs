@@ -21,7 +21,7 @@ pub enum OffBand {
 
 /// Least distance of a vertex from the ends of its edge, as a share of the edge, so that no triangle
 /// collapses. Moves the surface by at most this share of a cell.
-const LEAST_SHARE: f64 = 2e-3;
+const LEAST_SHARE: f64 = 1e-2;
 
 /// Marks a missing vertex or value.
 const NONE: u32 = u32::MAX;

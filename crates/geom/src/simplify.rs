@@ -2,12 +2,13 @@
 //! costs no time.
 //!
 //! [`decimate_with_care`] keeps a mean of squared distances small. Here the distance itself is measured
-//! afterwards, both ways, and what is around points that moved too far is allowed to move less.
+//! afterwards, both ways, and what is around points that moved too far is allowed to move less. Nor may the
+//! result cross itself, or fold where the surface did not fold before.
 
 use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
-use crate::decimate::decimate_with_care;
+use crate::decimate::{decimate, decimate_with_care};
 use crate::fold::folded_faces;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
@@ -23,8 +24,10 @@ const MOST_ROUNDS: usize = 12;
 const GENTLE_ROUNDS: usize = 3;
 const GENTLER: f64 = 0.25;
 
-/// Distance up to which two folded faces are at the same place, mm.
-const SAME_PLACE_MM: f64 = 0.5;
+/// Distance up to which a place belongs to a fold, mm.
+const AT_FOLD_MM: f64 = 0.5;
+/// Largest number of rounds of restoring triangles that cross; two are enough for all walls seen.
+const MOST_UNCROSSING_ROUNDS: usize = 6;
 
 /// A solid with fewer triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,28 +40,55 @@ pub struct Simplified {
     pub farthest_mm: f64,
 }
 
-/// Simplifies `solid` by collapsing edges. Points and triangle centres of both surfaces stay within
-/// `within_mm` of the other surface. The points `fixed`, by their indices, stay in place.
+/// Distances that a surface may move, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// Distance from the former surface in general.
+    pub within_mm: f64,
+    /// Distance within 0.5 mm of a fold: notches narrower than this can close. At least `within_mm`.
+    pub at_folds_mm: f64,
+}
+
+impl Reach {
+    /// Takes one distance for folds and all other places, mm.
+    pub fn everywhere(within_mm: f64) -> Self {
+        Self {
+            within_mm,
+            at_folds_mm: within_mm,
+        }
+    }
+}
+
+/// Simplifies `solid` by collapsing edges. Points and triangle centres of both surfaces stay within `reach`
+/// of the other surface. The points `fixed`, by their indices, stay in place.
 ///
 /// `None` if this distance cannot be kept, or if the surface would cross itself or fold where it did not
 /// before. Equal on any number of threads.
-pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplified> {
+pub fn simplify(solid: &Solid, fixed: &[u32], reach: Reach) -> Option<Simplified> {
     let mesh = solid.mesh();
     let old = TriangleBvh::new(mesh);
-    let mut tolerance = vec![MEAN_SHARE * within_mm; mesh.points.len()];
+    let folds = Folds::of(mesh, &old);
+    let mut tolerance = vec![MEAN_SHARE * reach.within_mm; mesh.points.len()];
+    for &point in &folds.points {
+        tolerance[point as usize] = MEAN_SHARE * reach.at_folds_mm;
+    }
     for &point in fixed {
         tolerance[point as usize] = 0.0;
     }
+    let limit_mm = |at: Vec3| match folds.are_at(at) {
+        true => reach.at_folds_mm,
+        false => reach.within_mm,
+    };
     for round in 0..MOST_ROUNDS {
         let few = decimate_with_care(mesh.clone(), &tolerance);
         let new = TriangleBvh::new(&few);
-        let (mut away, of_old) = points_away(mesh, &new, within_mm);
-        let (stray, of_new) = points_away(&few, &old, within_mm);
+        let (mut away, of_old) = points_away(mesh, &new, &limit_mm);
+        let (stray, of_new) = points_away(&few, &old, &limit_mm);
         away.extend(stray);
         let mut crossed = Vec::new();
         if away.is_empty() {
             crossed = crossing_faces(&few);
-            crossed.extend(new_folds(&few, &new, mesh, &old));
+            crossed.extend(folds.new_in(&few, &new));
         }
         if away.is_empty() && crossed.is_empty() {
             let nearest = |f: usize| old.nearest(few.face_center(f), f64::INFINITY).map(|n| n.face);
@@ -70,15 +100,8 @@ pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplifi
                 farthest_mm: of_old.max(of_new),
             });
         }
-        // A triangle that crosses another may be large, so its corners and its centre are all restored.
-        let corners_and_middle = |&f: &u32| {
-            few.corners(f as usize)
-                .into_iter()
-                .chain([few.face_center(f as usize)])
-        };
-        away.extend(crossed.iter().flat_map(corners_and_middle));
-        let nearest = |at: Vec3| old.nearest(at, f64::INFINITY).map(|n| n.face);
-        let beside: Vec<u32> = away.into_par_iter().filter_map(nearest).collect();
+        away.extend(corners_and_middles(&few, &crossed));
+        let beside = faces_beside(&old, away);
         let (share, n_rings) = if round < GENTLE_ROUNDS {
             (GENTLER, 0)
         } else {
@@ -87,6 +110,42 @@ pub fn simplify(solid: &Solid, fixed: &[u32], within_mm: f64) -> Option<Simplifi
         restore(&mut tolerance, mesh, &beside, share, n_rings);
     }
     None
+}
+
+/// Decimates `mesh` like [`decimate`], but so that no triangles of the result cross each other. The mesh must
+/// not cross itself. It comes back unchanged if that cannot be had.
+pub fn decimate_without_crossing(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
+    let mut few = decimate(mesh.clone(), tolerance_mm);
+    let mut crossed = crossing_faces(&few);
+    if crossed.is_empty() {
+        return few;
+    }
+    let (old, mut tolerance) = (TriangleBvh::new(&mesh), tolerance_mm.to_vec());
+    for _ in 0..MOST_UNCROSSING_ROUNDS {
+        let beside = faces_beside(&old, corners_and_middles(&few, &crossed).collect());
+        restore(&mut tolerance, &mesh, &beside, 0.0, 1);
+        few = decimate(mesh.clone(), &tolerance);
+        crossed = crossing_faces(&few);
+        if crossed.is_empty() {
+            return few;
+        }
+    }
+    mesh
+}
+
+/// Corners and centres of faces: one that crosses another may be large, so all of it is restored.
+fn corners_and_middles<'a>(mesh: &'a TriMesh, faces: &'a [u32]) -> impl Iterator<Item = Vec3> + 'a {
+    let of = |&f: &u32| {
+        let middle = mesh.face_center(f as usize);
+        mesh.corners(f as usize).into_iter().chain([middle])
+    };
+    faces.iter().flat_map(of)
+}
+
+/// Nearest face to each place.
+fn faces_beside(tree: &TriangleBvh, places: Vec<Vec3>) -> Vec<u32> {
+    let nearest = |at: Vec3| tree.nearest(at, f64::INFINITY).map(|n| n.face);
+    places.into_par_iter().filter_map(nearest).collect()
 }
 
 /// Reduces the tolerance of the corners of `faces` to a `share`, and with `n_rings` of those of as many rings
@@ -111,21 +170,41 @@ fn restore(tolerance: &mut [f64], mesh: &TriMesh, faces: &[u32], share: f64, n_r
     }
 }
 
-/// Returns the faces of `few` that fold, without those at places where the former mesh folds as well.
-fn new_folds(few: &TriMesh, few_bvh: &TriangleBvh, mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
-    let mut folds = folded_faces(few, few_bvh);
-    if !folds.is_empty() {
-        let former = TriMesh {
+/// Faces of a mesh that fold.
+struct Folds {
+    /// Corners of these faces.
+    points: Vec<u32>,
+    /// Tree of these faces; `None` without any.
+    bvh: Option<TriangleBvh>,
+}
+
+impl Folds {
+    fn of(mesh: &TriMesh, bvh: &TriangleBvh) -> Self {
+        let faces = folded_faces(mesh, bvh);
+        let triangles: Vec<[u32; 3]> = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
+        let points = triangles.concat();
+        let folded = TriMesh {
             points: mesh.points.clone(),
-            triangles: (folded_faces(mesh, bvh).into_iter())
-                .map(|f| mesh.triangles[f as usize])
-                .collect(),
+            triangles,
         };
-        let former = TriangleBvh::new(&former);
-        let near_sq = SAME_PLACE_MM * SAME_PLACE_MM;
-        folds.retain(|&face| former.nearest(few.face_center(face as usize), near_sq).is_none());
+        Self {
+            bvh: (!points.is_empty()).then(|| TriangleBvh::new(&folded)),
+            points,
+        }
     }
-    folds
+
+    /// Returns true if a place belongs to a fold.
+    fn are_at(&self, at: Vec3) -> bool {
+        let near_sq = AT_FOLD_MM * AT_FOLD_MM;
+        (self.bvh.as_ref()).is_some_and(|bvh| bvh.nearest(at, near_sq).is_some())
+    }
+
+    /// Returns the faces of `few` that fold at other places.
+    fn new_in(&self, few: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
+        let mut found = folded_faces(few, bvh);
+        found.retain(|&face| !self.are_at(few.face_center(face as usize)));
+        found
+    }
 }
 
 /// Returns the points where triangles of different `labels`, one per triangle, meet.
@@ -143,11 +222,17 @@ pub fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
     between
 }
 
-/// Points and triangle centres of `mesh` farther than `within_mm` from `other`, and the largest distance of
+/// Points and triangle centres of `mesh` farther than their limit from `other`, and the largest distance of
 /// the rest, mm.
-fn points_away(mesh: &TriMesh, other: &TriangleBvh, within_mm: f64) -> (Vec<Vec3>, f64) {
-    let limit_sq = within_mm * within_mm;
-    let of = |at: Vec3| (at, other.nearest(at, limit_sq).map(|n| n.distance_sq));
+fn points_away(
+    mesh: &TriMesh,
+    other: &TriangleBvh,
+    limit_mm: &(impl Fn(Vec3) -> f64 + Sync),
+) -> (Vec<Vec3>, f64) {
+    let of = |at: Vec3| {
+        let nearest = other.nearest(at, limit_mm(at).powi(2));
+        (at, nearest.map(|n| n.distance_sq))
+    };
     let points = mesh.points.par_iter().map(|&p| of(p));
     let middles = (0..mesh.triangles.len())
         .into_par_iter()
@@ -185,16 +270,15 @@ mod tests {
     #[test]
     fn no_point_is_farther_than_said() {
         let solid = ball(20.0);
-        let few = simplify(&solid, &[], 0.05).expect("a ball is simple");
+        let few = simplify(&solid, &[], Reach::everywhere(0.05)).expect("a ball is simple");
         assert!(2 * few.solid.mesh().triangles.len() < solid.mesh().triangles.len());
         assert!(farthest(solid.mesh(), few.solid.mesh()) <= 0.05);
         assert!(farthest(few.solid.mesh(), solid.mesh()) <= 0.05);
         assert!(few.farthest_mm <= 0.05 && few.farthest_mm > 0.0);
     }
 
-    #[test]
-    fn surfaces_nearer_than_the_distance_neither_cross_nor_fold_afterwards() {
-        // A ball in a shell, with a narrow gap between them.
+    /// A ball in a shell, with a narrow gap between them.
+    fn ball_in_shell() -> Solid {
         let ball = ball(20.0);
         let n_points = ball.mesh().points.len() as u32;
         let mut both = TriMesh::default();
@@ -208,18 +292,61 @@ mod tests {
             let triangles = ball.mesh().triangles.iter().map(turned);
             both.triangles.extend(triangles.map(|t| t.map(|v| v + first)));
         }
-        let both = Solid::new(both).expect("closed");
-        let folds = |mesh: &TriMesh| folded_faces(mesh, &TriangleBvh::new(mesh));
+        Solid::new(both).expect("closed")
+    }
+
+    fn folds(mesh: &TriMesh) -> Vec<u32> {
+        folded_faces(mesh, &TriangleBvh::new(mesh))
+    }
+
+    #[test]
+    fn surfaces_nearer_than_the_distance_neither_cross_nor_fold_afterwards() {
+        let both = ball_in_shell();
         let careless = decimate_with_care(
             both.mesh().clone(),
             &vec![MEAN_SHARE * 0.1; both.mesh().points.len()],
         );
         assert!(!crossing_faces(&careless).is_empty());
         assert!(folds(both.mesh()).is_empty() && !folds(&careless).is_empty());
-        let few = simplify(&both, &[], 0.1).expect("some of it is simple");
+        let few = simplify(&both, &[], Reach::everywhere(0.1)).expect("some of it is simple");
         assert!(crossing_faces(few.solid.mesh()).is_empty());
         assert!(folds(few.solid.mesh()).is_empty());
         assert!(few.solid.mesh().triangles.len() < both.mesh().triangles.len());
+    }
+
+    #[test]
+    fn decimation_that_would_cross_is_restored_there_and_not_elsewhere() {
+        let both = ball_in_shell().into_mesh();
+        let tolerance = vec![0.05; both.points.len()];
+        let careless = decimate(both.clone(), &tolerance);
+        assert!(!crossing_faces(&careless).is_empty());
+        let few = decimate_without_crossing(both.clone(), &tolerance);
+        assert!(crossing_faces(&few).is_empty());
+        let n = |mesh: &TriMesh| mesh.triangles.len();
+        assert!(
+            n(&careless) <= n(&few) && n(&few) < n(&both),
+            "{} of {}",
+            n(&few),
+            n(&both)
+        );
+    }
+
+    #[test]
+    fn a_fold_goes_where_the_surface_may_move_far_enough() {
+        // A point pushed past its neighbour turns the triangles between them over.
+        const PAST_MM: f64 = 0.06;
+        let mut mesh = ball(20.0).into_mesh();
+        let [a, b, _] = mesh.triangles[1000];
+        let [from, to] = [a, b].map(|v| mesh.points[v as usize]);
+        mesh.points[a as usize] = to + (to - from).normalize() * PAST_MM;
+        let folded = Solid::new(mesh).expect("still closed");
+        assert!(!folds(folded.mesh()).is_empty());
+        let reach = Reach {
+            within_mm: 0.01,
+            at_folds_mm: 0.1,
+        };
+        let few = simplify(&folded, &[], reach).expect("a ball is simple");
+        assert!(folds(few.solid.mesh()).is_empty() && few.farthest_mm <= 0.1);
     }
 
     #[test]
@@ -228,7 +355,8 @@ mod tests {
         let mesh = solid.mesh();
         let label = |mesh: &TriMesh, f: usize| i64::from(mesh.face_center(f).x > 0.3);
         let labels: Vec<i64> = (0..mesh.triangles.len()).map(|f| label(mesh, f)).collect();
-        let few = simplify(&solid, &points_between(mesh, &labels), 0.05).expect("a ball is simple");
+        let few = simplify(&solid, &points_between(mesh, &labels), Reach::everywhere(0.05))
+            .expect("a ball is simple");
         let after: Vec<i64> = few.source_face.iter().map(|&f| labels[f as usize]).collect();
         let border = |mesh: &TriMesh, labels: &[i64]| {
             let mut points: Vec<[i64; 3]> = points_between(mesh, labels)

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selection};
 use shellock_geom::repair::{InsideOut, RepairMode, Repaired, repair_as};
-use shellock_geom::simplify::{points_between, simplify};
+use shellock_geom::simplify::{Reach, points_between, simplify};
 use shellock_geom::{Solid, Vec3};
 use size::{DEFAULT_SIZE_MM, check_size, scale};
 pub use size::{is_usual, length};
@@ -148,7 +148,7 @@ fn simplify_model(mut model: Model, resolution_mm: f64) -> Result<Model, Failure
     let n_before = model.solid.mesh().triangles.len();
     let between = |labels: &Vec<i64>| points_between(model.solid.mesh(), labels);
     let fixed = model.labels.as_ref().map(between).unwrap_or_default();
-    match simplify(&model.solid, &fixed, resolution_mm) {
+    match simplify(&model.solid, &fixed, Reach::everywhere(resolution_mm)) {
         Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
             model.notes.push(format!(
                 "the surface was simplified from {n_before} to {} triangles, within {:.3} mm of the original \

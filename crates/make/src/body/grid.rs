@@ -5,9 +5,9 @@ use shellock_assembly::LatticeDirection;
 use shellock_geom::band::{Band, GridTooFine};
 use shellock_geom::boolean::NotAVolume;
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::decimate::decimate;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::signed_distance::SignedDistance;
+use shellock_geom::simplify::decimate_without_crossing;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_report::PatchId;
 use shellock_surface::SegmentedSurface;
@@ -149,7 +149,7 @@ fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Result<Volume, NotA
     let field: Vec<f32> = depth.iter().map(|d| d - depth_mm as f32).collect();
     let mesh = contour(band, &field, OffBand::LikeNeighbours);
     let tolerance = vec![INNER_TOLERANCE_MM; mesh.points.len()];
-    Volume::from_closed_mesh(&decimate(mesh, &tolerance))
+    Volume::from_closed_mesh(&decimate_without_crossing(mesh, &tolerance))
 }
 
 /// A patch and the distance to it, mm.

@@ -3,8 +3,8 @@
 use std::cell::Cell;
 
 use rayon::prelude::*;
-use shellock_geom::decimate::decimate;
 use shellock_geom::marching_cubes::{Corners, OffBand, contour_with_corners};
+use shellock_geom::simplify::decimate_without_crossing;
 use shellock_geom::{TriMesh, Vec3, Volume};
 use shellock_report::{Cancelled, Ctx, PatchId};
 
@@ -150,7 +150,7 @@ impl Splitter<'_> {
             .par_iter()
             .map(|&p| self.tolerance_mm(p, h(p)))
             .collect();
-        decimate(collar, &tolerance)
+        decimate_without_crossing(collar, &tolerance)
     }
 
     /// Field that is positive in the collar: from the gap's border on the side of `sign` to some cells beyond

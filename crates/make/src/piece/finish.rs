@@ -7,7 +7,7 @@ use shellock_assembly::motion::Contact;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
 use shellock_geom::rounding::{NotPrintable, printable_body};
-use shellock_geom::simplify::simplify;
+use shellock_geom::simplify::{Reach, simplify};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 use shellock_plan::LatticePlan;
 use shellock_report::{Cancelled, Ctx, IdVec, PatchId, Warning};
@@ -23,6 +23,9 @@ use crate::connector::{ConnectorParams, Run, contacts};
 
 /// Greatest distance of a finished piece's surface from the one made, mm: far below what a printer resolves.
 const NEAR_MM: f64 = 0.01;
+/// Greatest such distance at folds, mm. Where two cuts meet at a small angle, a notch remains that is thinner
+/// than a hair.
+const AT_FOLDS_MM: f64 = 0.05;
 /// Depth below the model's surface up to which a piece's points stay in place, mm: it is seen.
 const VISIBLE_MM: f64 = 0.3;
 /// Distance of ribs from the rim, mm.
@@ -333,8 +336,9 @@ fn printable(
     Ok((mesh, has_few))
 }
 
-/// The piece with fewer triangles, within [`NEAR_MM`], except on and just below the model's surface. `None`
-/// if no other surface keeps that distance. `depth_mm` is the depth below that surface, where it is known.
+/// The piece with fewer triangles, within [`NEAR_MM`], or [`AT_FOLDS_MM`] at folds, except on and just below
+/// the model's surface. `None` if no other surface keeps that distance. `depth_mm` is the depth below that
+/// surface, where it is known.
 fn with_few_triangles(piece: &Volume, depth_mm: impl Fn(Vec3) -> Option<f64>) -> Option<Volume> {
     let solid = Solid::new(piece.to_mesh()).ok()?;
     let is_visible = |&p: &Vec3| depth_mm(p).is_some_and(|depth| depth < VISIBLE_MM);
@@ -342,7 +346,11 @@ fn with_few_triangles(piece: &Volume, depth_mm: impl Fn(Vec3) -> Option<f64>) ->
     let fixed: Vec<u32> = (0..points.len() as u32)
         .filter(|&v| is_visible(&points[v as usize]))
         .collect();
-    let few = simplify(&solid, &fixed, NEAR_MM)?;
+    let reach = Reach {
+        within_mm: NEAR_MM,
+        at_folds_mm: AT_FOLDS_MM,
+    };
+    let few = simplify(&solid, &fixed, reach)?;
     Volume::from_closed_mesh(few.solid.mesh()).ok()
 }
 
