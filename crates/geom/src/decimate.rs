@@ -47,14 +47,20 @@ const LEAST_HEIGHT: f64 = 0.03;
 /// vertex takes part in at most one collapse, along its cheapest edge. This needs no queue and gives even
 /// triangles. Sequential, so that the same mesh always gives the same bytes.
 pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
-    run(mesh, tolerance_mm, Care::Fast)
+    run(mesh, tolerance_mm, Care::Fast, &[])
 }
 
 /// Decimates like [`decimate`], and leaves fewer triangles and hardly any sliver: a vertex whose cheapest
 /// edge may not collapse tries its others, the long edges of flat triangles are flipped, and a point without
 /// tolerance takes others in.
 pub fn decimate_with_care(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
-    run(mesh, tolerance_mm, Care::Thorough)
+    run(mesh, tolerance_mm, Care::Thorough, &[])
+}
+
+/// Decimates like [`decimate_with_care`], but slivers at the points `folded`, by their indices, may turn
+/// over: beside a fold the mean normal does not tell which side is out.
+pub fn decimate_at_folds(mesh: TriMesh, tolerance_mm: &[f64], folded: &[u32]) -> TriMesh {
+    run(mesh, tolerance_mm, Care::Thorough, folded)
 }
 
 /// Edges that are tried.
@@ -66,11 +72,12 @@ enum Care {
     Thorough,
 }
 
-fn run(mesh: TriMesh, tolerance_mm: &[f64], care: Care) -> TriMesh {
+fn run(mesh: TriMesh, tolerance_mm: &[f64], care: Care, folded: &[u32]) -> TriMesh {
     assert_eq!(mesh.points.len(), tolerance_mm.len(), "one tolerance a point");
     let Some(mut state) = Decimation::new(&mesh, tolerance_mm, care) else {
         return mesh;
     };
+    folded.iter().for_each(|&v| state.is_folded[v as usize] = true);
     let mut alive: Vec<u32> = (0..mesh.points.len() as u32)
         .filter(|&v| tolerance_mm[v as usize] > 0.0)
         .collect();
@@ -156,6 +163,8 @@ struct Decimation {
     tolerance: Vec<f64>,
     /// Last round in which each vertex took part in a collapse; [`GONE`] if it was merged into another.
     round: Vec<u32>,
+    /// True for the vertices at which slivers may turn over.
+    is_folded: Vec<bool>,
     care: Care,
 }
 
@@ -208,6 +217,7 @@ impl Decimation {
             quadrics,
             tolerance: tolerance_mm.to_vec(),
             round: vec![0; mesh.points.len()],
+            is_folded: vec![false; mesh.points.len()],
             care,
         };
         state.has_disks_only().then_some(state)
@@ -338,7 +348,7 @@ impl Decimation {
             // The normal of a sliver says nothing about the surface.
             let is_sliver = old < flat_mm * longest_sq([p, b, c]).sqrt();
             let is_upright = match is_sliver {
-                true => mean.dot(after) > LEAST_MEAN_COS * new,
+                true => self.is_folded[moved as usize] || mean.dot(after) > LEAST_MEAN_COS * new,
                 false => before.dot(after) > LEAST_COS * old * new,
             };
             is_upright && height(new, at) >= LEAST_HEIGHT.min(height(old, p)).min(worst_removed)
@@ -389,6 +399,7 @@ impl Decimation {
         self.points[u] = at;
         self.quadrics[u] = self.quadrics[u].plus(self.quadrics[v]);
         self.tolerance[u] = self.tolerance[u].min(self.tolerance[v]);
+        self.is_folded[u] &= self.is_folded[v];
         (self.round[u], self.round[v]) = (round, GONE);
     }
 

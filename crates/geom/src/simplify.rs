@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
-use crate::decimate::{decimate, decimate_with_care};
+use crate::decimate::{decimate, decimate_at_folds};
 use crate::fold::folded_faces;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
@@ -28,6 +28,9 @@ const GENTLER: f64 = 0.25;
 
 /// Distance up to which a place belongs to a fold, mm.
 const AT_FOLD_MM: f64 = 0.5;
+/// Attempts to be rid of folds: distance from a fold up to which points may move, mm, and the distance by
+/// which they may, as a share of [`Reach::at_folds_mm`].
+const ATTEMPTS_AT_FOLDS: [(f64, f64); 3] = [(0.25, 0.6), (0.25, 1.0), (0.5, 1.0)];
 /// Largest number of rounds of closing notches; two are enough for all seen.
 const MOST_CLOSING_ROUNDS: usize = 6;
 /// Largest number of rounds of restoring triangles that cross; two are enough for all walls seen.
@@ -74,21 +77,13 @@ pub fn simplify(solid: &Solid, fixed: &[u32], reach: Reach) -> Option<Simplified
         old: mesh,
         tree: TriangleBvh::new(mesh),
         fixed,
-        reach,
+        within_mm: reach.within_mm,
     };
     // Most surfaces fold neither before nor after, so former folds are sought only if later ones are found.
     match job.rounds(mesh, None) {
         Outcome::Simple(simplified) => Some(simplified),
         Outcome::TooFar => None,
-        Outcome::Folded => {
-            let folds = Folds::of(mesh, &job.tree);
-            let closed = close_notches(mesh, &folds, fixed, reach.at_folds_mm);
-            let (start, left) = closed.as_ref().map_or((mesh, &folds), |c| (&c.0, &c.1));
-            match job.rounds(start, Some([&folds, left])) {
-                Outcome::Simple(simplified) => Some(simplified),
-                _ => None,
-            }
-        }
+        Outcome::Folded => job.unfolded(reach.at_folds_mm),
     }
 }
 
@@ -101,26 +96,71 @@ enum Outcome {
     Folded,
 }
 
+/// Room for folds to go.
+#[derive(Clone, Copy)]
+struct Room<'a> {
+    /// Folds of the old mesh, and of the one that is simplified.
+    folds: [&'a Folds; 2],
+    /// Distance from a fold up to which points may move, mm.
+    near_mm: f64,
+    /// Distance by which they may move, mm.
+    reach_mm: f64,
+}
+
 /// Inputs that all rounds of simplifying share.
 struct Job<'a> {
     old: &'a TriMesh,
     /// Tree of the old mesh.
     tree: TriangleBvh,
     fixed: &'a [u32],
-    reach: Reach,
+    within_mm: f64,
 }
 
 impl Job<'_> {
-    /// Simplifies `start`, which is the old mesh or has its points elsewhere. `folds` are those of the old
-    /// mesh and of `start`, if they are known.
-    fn rounds(&self, start: &TriMesh, folds: Option<[&Folds; 2]>) -> Outcome {
-        let mut tolerance = self.tolerance(folds.map(|[former, _]| former));
-        let limit_mm = |at: Vec3| match folds.is_some_and(|[former, _]| former.are_at(at)) {
-            true => self.reach.at_folds_mm,
-            false => self.reach.within_mm,
+    /// Simplifies a surface that would fold afterwards. Where it folded before, points may move by
+    /// `at_folds_mm`. Of several attempts, the first without folds counts, else the one with the fewest.
+    fn unfolded(&self, at_folds_mm: f64) -> Option<Simplified> {
+        let former = Folds::of(self.old, &self.tree);
+        let mut best: Option<(usize, Simplified)> = None;
+        for (near_mm, share) in ATTEMPTS_AT_FOLDS {
+            let reach_mm = self.within_mm.max(share * at_folds_mm);
+            let closed = close_notches(self.old, &former, self.fixed, reach_mm);
+            let (start, left) = closed.as_ref().map_or((self.old, &former), |c| (&c.0, &c.1));
+            let room = Room {
+                folds: [&former, left],
+                near_mm,
+                reach_mm,
+            };
+            let Outcome::Simple(simplified) = self.rounds(start, Some(room)) else {
+                continue;
+            };
+            let mesh = simplified.solid.mesh();
+            let n_folds = folded_faces(mesh, &TriangleBvh::new(mesh)).len();
+            if best.as_ref().is_none_or(|best| n_folds < best.0) {
+                best = Some((n_folds, simplified));
+            }
+            if n_folds == 0 || former.n == 0 {
+                break;
+            }
+        }
+        best.map(|best| best.1)
+    }
+
+    /// Simplifies `start`, which is the old mesh or has its points elsewhere, with `room` for its folds if
+    /// they are known.
+    fn rounds(&self, start: &TriMesh, room: Option<Room<'_>>) -> Outcome {
+        let folded: Vec<u32> = room.map_or_else(Vec::new, |room| self.points_at(room));
+        let mut tolerance = self.tolerance(&folded, room.map_or(self.within_mm, |room| room.reach_mm));
+        let limit_mm = |at: Vec3| match room {
+            Some(Room {
+                folds: [former, _],
+                reach_mm,
+                ..
+            }) if former.are_within(AT_FOLD_MM, at) => reach_mm,
+            _ => self.within_mm,
         };
         for round in 0..MOST_ROUNDS {
-            let few = decimate_with_care(start.clone(), &tolerance);
+            let few = decimate_at_folds(start.clone(), &tolerance, &folded);
             let new = TriangleBvh::new(&few);
             let (mut away, of_old) = points_away(self.old, &new, &limit_mm);
             let (stray, of_new) = points_away(&few, &self.tree, &limit_mm);
@@ -128,8 +168,8 @@ impl Job<'_> {
             let mut crossed = Vec::new();
             if away.is_empty() {
                 crossed = crossing_faces(&few);
-                match folds {
-                    Some([_, left]) => crossed.extend(left.new_in(&few, &new)),
+                match room {
+                    Some(room) => crossed.extend(room.folds[1].new_in(&few, &new)),
                     None if !folded_faces(&few, &new).is_empty() => return Outcome::Folded,
                     None => {}
                 }
@@ -150,11 +190,17 @@ impl Job<'_> {
         Outcome::TooFar
     }
 
-    /// Tolerance of each point, mm, which is larger at folds.
-    fn tolerance(&self, folds: Option<&Folds>) -> Vec<f64> {
-        let mut tolerance = vec![MEAN_SHARE * self.reach.within_mm; self.old.points.len()];
-        for &point in folds.iter().flat_map(|folds| &folds.points) {
-            tolerance[point as usize] = MEAN_SHARE * self.reach.at_folds_mm;
+    /// Points near former folds.
+    fn points_at(&self, room: Room<'_>) -> Vec<u32> {
+        let is_near = |v: &u32| room.folds[0].are_within(room.near_mm, self.old.points[*v as usize]);
+        (0..self.old.points.len() as u32).filter(is_near).collect()
+    }
+
+    /// Tolerance of each point, mm, which is larger at those that are `folded`.
+    fn tolerance(&self, folded: &[u32], reach_mm: f64) -> Vec<f64> {
+        let mut tolerance = vec![MEAN_SHARE * self.within_mm; self.old.points.len()];
+        for &point in folded {
+            tolerance[point as usize] = MEAN_SHARE * reach_mm;
         }
         for &point in self.fixed {
             tolerance[point as usize] = 0.0;
@@ -260,16 +306,16 @@ impl Folds {
         }
     }
 
-    /// Returns true if a place belongs to a fold.
-    fn are_at(&self, at: Vec3) -> bool {
-        let near_sq = AT_FOLD_MM * AT_FOLD_MM;
+    /// Returns true if a fold is within `near_mm` of a place.
+    fn are_within(&self, near_mm: f64, at: Vec3) -> bool {
+        let near_sq = near_mm * near_mm;
         (self.bvh.as_ref()).is_some_and(|bvh| bvh.nearest(at, near_sq).is_some())
     }
 
     /// Returns the faces of `few` that fold at other places.
     fn new_in(&self, few: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
         let mut found = folded_faces(few, bvh);
-        found.retain(|&face| !self.are_at(few.face_center(face as usize)));
+        found.retain(|&face| !self.are_within(AT_FOLD_MM, few.face_center(face as usize)));
         found
     }
 }
@@ -363,6 +409,7 @@ mod tests {
     use super::*;
     use crate::Aabb;
     use crate::contour::contour;
+    use crate::decimate::decimate_with_care;
 
     fn ball(radius: f64) -> Solid {
         let bounds = Aabb {
