@@ -37,7 +37,7 @@ pub const QUICK: [Case; 3] = [
             "--figure",
             "dinosaur",
             "--size",
-            "50",
+            "40",
             "--pieces",
             "3",
             "--key",
