@@ -1,9 +1,9 @@
 //! Simplification: fewer triangles within a given distance of a solid, so that detail too fine for printing
 //! costs no time.
 //!
-//! [`decimate_with_care`] keeps a mean of squared distances small. Here the distance itself is measured
-//! afterwards, both ways, and what is around points that moved too far is allowed to move less. Nor may the
-//! result cross itself, or fold where the surface did not fold before.
+//! [`decimate_with_care`](crate::decimate::decimate_with_care) keeps a mean of squared distances small. Here
+//! the distance itself is measured afterwards, both ways, and what is around points that moved too far is
+//! allowed to move less. Nor may the result cross itself, or fold where the surface did not fold before.
 
 use std::collections::BTreeMap;
 
