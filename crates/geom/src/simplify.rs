@@ -31,9 +31,9 @@ const AT_FOLD_MM: f64 = 0.5;
 /// Attempts to be rid of folds: distance from a fold up to which points may move, mm, and the distance by
 /// which they may, as a share of [`Reach::at_folds_mm`].
 const ATTEMPTS_AT_FOLDS: [(f64, f64); 3] = [(0.25, 0.6), (0.25, 1.0), (0.5, 1.0)];
-/// Largest number of rounds of closing notches; two are enough for all seen.
+/// Largest number of rounds of closing notches.
 const MOST_CLOSING_ROUNDS: usize = 6;
-/// Largest number of rounds of restoring triangles that cross; two are enough for all walls seen.
+/// Largest number of rounds of restoring triangles that cross.
 const MOST_UNCROSSING_ROUNDS: usize = 6;
 
 /// A solid with fewer triangles.
