@@ -495,7 +495,7 @@ mod tests {
 
     #[test]
     fn a_notch_thinner_than_a_hair_is_closed() {
-        // A groove 0.03 mm deep, whose walls are 14 degrees apart, runs along the top of a block.
+        // A groove 0.03 mm deep, whose walls are 8 degrees apart, runs along the top of a block.
         let profile = [
             [0.0, 0.0],
             [4.0, 0.0],
