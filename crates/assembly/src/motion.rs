@@ -12,7 +12,7 @@ mod system;
 
 use forces::Balance;
 use nalgebra::DVector;
-pub(crate) use play::{Corner, Limits};
+pub(crate) use play::{Corner, Limits, Span};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -101,8 +101,8 @@ fn centered(contacts: &[Contact], origin: Vec3) -> Vec<Contact> {
 /// Greatest small motion of a piece within its contacts while its neighbours rest: displacement of `middle`,
 /// mm, and rotation, degrees.
 ///
-/// Each is the length of the vector of the greatest values along the coordinate axes. Unlimited motions count
-/// as 100 mm and 1 rad.
+/// Each belongs to a motion that the contacts allow, and does not depend on the coordinate axes but for the
+/// search ([`Span::farthest`]). Unlimited motions count as 100 mm and 1 rad.
 pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
     /// Distance at which rotations count as displacements, mm.
     const LENGTH_MM: f64 = 50.0;
@@ -119,20 +119,17 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
         .collect();
     let limits = Limits::new(&system, &gaps);
     let mut corner = Corner::new(&limits);
-    let mut most = |from: usize, end: f64, scale: f64| {
-        let mut axes = [0.0f64; 3];
-        for (k, most) in axes.iter_mut().enumerate() {
-            for sign in [1.0, -1.0] {
-                let towards =
-                    DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
-                *most = most.max(corner.farthest(&towards).map_or(end, |x| x.min(end)));
-            }
-        }
-        Vec3::from(axes).length()
+    let mut most = |from: usize, scale: f64, end: f64| {
+        let span = Span {
+            n: system.n,
+            from,
+            scale,
+        };
+        span.farthest(&mut corner).map_or(end, |far| far.min(end))
     };
     [
-        most(0, ENDLESS[0], 1.0),
-        most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees(),
+        most(0, 1.0, ENDLESS[0]),
+        most(3, 1.0 / LENGTH_MM, ENDLESS[1]).to_degrees(),
     ]
 }
 

@@ -26,12 +26,16 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
             reason,
             blockers: Vec::new(),
             articulations: Vec::new(),
+            apart: apart(space, PieceSet::first(0)).iter().collect(),
         });
     }
     let articulations = space.articulations();
     if articulations.is_empty() {
         return None;
     }
+    let hanging = (articulations.iter())
+        .map(|&p| apart(space, PieceSet::one(p)))
+        .fold(PieceSet::first(0), PieceSet::union);
     let names: Vec<String> = articulations.iter().map(PatchId::to_string).collect();
     let reason = format!(
         "no plan locks, since all that joins some pieces to the others goes through piece {}; split it \
@@ -41,8 +45,25 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     Some(PlanOutcome::Infeasible {
         reason,
         blockers: Vec::new(),
+        apart: hanging.iter().collect(),
         articulations,
     })
+}
+
+/// Pieces outside the largest group of pieces that neighbours join, while the pieces of `without` are away; of
+/// equal groups, the first counts.
+fn apart(space: &Space<'_>, without: PieceSet) -> PieceSet {
+    let present = space.all().minus(without);
+    let group = |first: PatchId| {
+        let joined = |q: &PatchId| {
+            let pair: PieceSet = [first, *q].into_iter().collect();
+            pair.is_joined_within(present, &space.neighbours)
+        };
+        present.iter().filter(joined).collect::<PieceSet>()
+    };
+    let groups = present.iter().map(group);
+    let largest = groups.reduce(|best, group| if group.len() > best.len() { group } else { best });
+    largest.map_or(present, |largest| present.minus(largest))
 }
 
 /// Explains a search that got no further than the pieces `stuck`.
@@ -72,6 +93,7 @@ pub(super) fn stuck(space: &Space<'_>, stuck: PieceSet) -> PlanOutcome {
         reason,
         blockers,
         articulations: Vec::new(),
+        apart: Vec::new(),
     }
 }
 

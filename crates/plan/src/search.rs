@@ -126,6 +126,7 @@ pub fn search_with(
             reason,
             blockers: Vec::new(),
             articulations: Vec::new(),
+            apart: Vec::new(),
         });
     }
     let keys = choices(params, survey);

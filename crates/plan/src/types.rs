@@ -204,5 +204,8 @@ pub enum PlanOutcome {
         blockers: Vec<Blocker>,
         /// Articulation pieces of the contact graph. Splitting one of them may help.
         articulations: Vec<PatchId>,
+        /// Pieces that seams long enough for connectors do not join to most others, or only through an
+        /// articulation piece. Longer seams may help.
+        apart: Vec<PatchId>,
     },
 }

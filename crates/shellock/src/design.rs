@@ -21,6 +21,7 @@ mod division;
 mod failure;
 mod job;
 mod kit;
+mod longer;
 mod outcome;
 mod outlook;
 mod planning;

@@ -20,7 +20,7 @@ use shellock_geom::Vec3;
 
 use super::bearing::{Bearing, Surfaces};
 use super::quantity::{Quantities, Quantity, other_lines};
-use crate::motion::{Corner, Freedom, Limits, System};
+use crate::motion::{Corner, Freedom, Limits, Span, System};
 use crate::verify::contact::Contact;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -183,9 +183,7 @@ impl Problem<'_> {
         let quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
         let round = Round::new(self, &bearings, &quantities, &beds);
-        round.ends().map_or_else(Vec::new, |found| {
-            quantities.linear(&round.collect_bounds(&found.ends))
-        })
+        round.small_motion().into_iter().collect()
     }
 
     /// Searches for the proof. The answer depends on the question alone, on any number of threads.
@@ -221,7 +219,7 @@ impl Problem<'_> {
                     .all(|(f, a)| f[0] <= a[0] && f[1] <= a[1])
             };
             if n_before == 0 {
-                answer.linear = quantities.linear(&found);
+                answer.linear = round.small_motion().into_iter().collect();
                 answer.swings = self.swings(&motions);
             }
             answer.bearings.extend(round.bearings_that_hold().map(|i| own[i]));
@@ -444,6 +442,29 @@ impl<'a> Round<'a> {
                 .for_each(|corner| known.iter().for_each(|&row| corner.look_at(row)));
         }
         Some(Found { ends, motions })
+    }
+
+    /// Displacement, mm, and rotation, rad, of the only free piece in the small motions that go farthest;
+    /// `None` if several pieces are free, or if nothing limits this one.
+    fn small_motion(&self) -> Option<[f64; 2]> {
+        if self.problem.free.len() != 1 {
+            return None;
+        }
+        let least: Vec<f64> = (0..self.system.rows.len())
+            .map(|row| self.least_mm(row))
+            .collect();
+        let late = |row: usize| self.bound_mm(row);
+        let limits = Limits::late(&self.system, &least, &late);
+        let mut corner = Corner::new(&limits);
+        let mut most = |from: usize, scale: f64| {
+            let span = Span {
+                n: self.system.n,
+                from,
+                scale,
+            };
+            span.farthest(&mut corner)
+        };
+        Some([most(0, 1.0)?, most(3, 1.0 / LENGTH_MM)?])
     }
 
     /// Greatest values in these motions of the quantities that no bearing needed.

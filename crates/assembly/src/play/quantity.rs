@@ -199,21 +199,6 @@ impl Quantities {
         }
     }
 
-    /// Displacement, mm, and rotation, rad, of each free piece in `found`.
-    pub fn linear(&self, found: &BTreeMap<usize, Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
-        let norm = |q: usize| {
-            Quantity {
-                most: found[&q].clone(),
-                ..self.all[q].clone()
-            }
-            .norm()
-        };
-        self.of_piece
-            .values()
-            .map(|&[turn, shift]| [norm(shift), norm(turn)])
-            .collect()
-    }
-
     /// Greatest distance of the bearing's point, seen from `b`, from the position predicted by the logarithms
     /// of the poses, mm: docs/notes/certificate.md.
     pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {

@@ -19,7 +19,7 @@ pub(super) const COST_SLACK: f64 = 0.25;
 
 /// Share of the allowed play below which pieces hardly ever rattle. Four of five finished pieces have 0.74 to
 /// 1.2 times the predicted play.
-const SURE_PLAY: f64 = 0.85;
+pub const SURE_PLAY: f64 = 0.85;
 
 /// Share of the allowed play above which pieces of a plan are expected to rattle too much. It lies below
 /// [`SLIGHT`], since runs may come out shorter than planned.
@@ -37,13 +37,14 @@ pub struct ExpectedPlay {
 
 impl ExpectedPlay {
     /// Pieces but the key that surely rattle too much, the loosest first.
-    pub fn rattlers(&self) -> Vec<PatchId> {
+    pub fn rattlers(&self) -> Vec<(PatchId, f64)> {
         loosest_first(self.key, &self.excess, SURE * SLIGHT)
     }
 
     /// Pieces but the key whose play no kit may have, the loosest first.
     pub fn loose(&self) -> Vec<PatchId> {
-        loosest_first(self.key, &self.excess, SURE * LOOSE)
+        let loose = loosest_first(self.key, &self.excess, SURE * LOOSE).into_iter();
+        loose.map(|l| l.0).collect()
     }
 }
 
@@ -104,7 +105,7 @@ impl Foresight {
 
     /// Pieces but the key that are expected to rattle too much even in the plan whose loosest piece has the
     /// least play, the loosest first.
-    pub fn rattlers(&self) -> Vec<PatchId> {
+    pub fn rattlers(&self) -> Vec<(PatchId, f64)> {
         let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| {
             loosest_first(plan.plan.key(), excess, LIKELY_RATTLE)
@@ -146,7 +147,7 @@ fn widest(excess: &[f64]) -> f64 {
 }
 
 /// Pieces but the key with a wider play than `most`, the loosest first; play is a share of the allowed play.
-fn loosest_first(key: PatchId, excess: &[f64], most: f64) -> Vec<PatchId> {
+fn loosest_first(key: PatchId, excess: &[f64], most: f64) -> Vec<(PatchId, f64)> {
     let excess = excess
         .iter()
         .enumerate()
@@ -155,5 +156,5 @@ fn loosest_first(key: PatchId, excess: &[f64], most: f64) -> Vec<PatchId> {
         .filter(|(piece, excess)| *excess > most && *piece != key)
         .collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
-    wide.into_iter().map(|w| w.0).collect()
+    wide
 }

@@ -392,7 +392,7 @@ impl Agenda {
             // A change before a kit was allowed when its trial began. Without it the trial would end in
             // nothing.
             let permit = match step {
-                Step::Enlarge | Step::JoinPredicted | Step::JoinWeak | Step::Thicken => {
+                Step::Enlarge | Step::Lengthen | Step::JoinPredicted | Step::JoinWeak | Step::Thicken => {
                     self.permit_at_any_time(step)
                 }
                 _ => self.permit(ctx, step),
@@ -554,7 +554,9 @@ impl Agenda {
             Step::NextWay => self
                 .clock
                 .is_too_late_for_trial(ctx, 0.0, self.share_of_next_way()),
-            Step::Enlarge | Step::JoinPredicted | Step::JoinWeak => self.clock.is_too_late_for_change(ctx),
+            Step::Enlarge | Step::Lengthen | Step::JoinPredicted | Step::JoinWeak => {
+                self.clock.is_too_late_for_change(ctx)
+            }
             Step::LowerLoad => self.clock.is_over(ctx),
         }
     }

@@ -6,6 +6,7 @@ use super::agenda::{Allowance, Step};
 use super::division::{Division, revise};
 use super::failure::Failure;
 use super::kit::{Recipe, make};
+use super::longer;
 use super::planning::Planning;
 use super::strengthen::strengthen;
 use super::trial::{Change, Learned, Parts};
@@ -15,7 +16,7 @@ use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams, Sta
 use crate::plan::lesson::Lesson;
 use crate::plan::{FoundPlan, Handover, LatticePlan, PlanOutcome, PlanParams};
 use crate::segmentation::join;
-use crate::{Cancelled, Ctx, MakeError, PatchId, SegmentedSurface, key, metric, plan};
+use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 
 /// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves
 /// the optimum of a koala in ten pieces, but not that of a bunny in twelve.
@@ -100,10 +101,7 @@ pub(super) fn make_kit(
         Ok(Err(instead)) => Found {
             is_stopped: true,
             ..match instead {
-                Instead::Join(fewer) => {
-                    let change = Change::Divide(Step::JoinRattling, fewer, None);
-                    Found::nothing(Failure::of("pieces rattle")).with(Some(change))
-                }
+                Instead::Change(change) => Found::nothing(Failure::of("pieces rattle")).with(Some(change)),
                 Instead::Replan(lessons) => learn_and_remake(ctx, division, learned, &lessons, allowance)?,
             }
         },
@@ -132,8 +130,8 @@ pub(super) fn make_kit(
 
 /// Something that promises more than finishing a kit.
 enum Instead {
-    /// Makes the kit of fewer pieces.
-    Join(SegmentedSurface),
+    /// Makes the kit of other pieces.
+    Change(Change),
     /// Makes the kit of another plan, with what the connectors of this one taught.
     Replan(Vec<Lesson>),
 }
@@ -149,16 +147,22 @@ fn rather_than_finish(
     let plan = handover.found_plan();
     let expected = foresight.expected_play(plan, &parts.contacts);
     let (rattling, loose) = (expected.rattlers(), expected.loose());
+    if allowance.may_stop_for(Step::Lengthen)
+        && let Some(longer) = longer::for_play(ctx, division, &rattling, allowance)?
+    {
+        return Ok(Some(Instead::Change(longer)));
+    }
     if !rattling.is_empty()
         && allowance.may_stop_for(Step::JoinRattling)
         && let Some(fewer) = join(
             ctx,
             &division.settings.segmentation,
             &division.surface,
-            loosest_half(&rattling),
+            &loosest_half(&rattling),
         )?
     {
-        return Ok(Some(Instead::Join(fewer)));
+        let change = Change::Divide(Step::JoinRattling, fewer, None);
+        return Ok(Some(Instead::Change(change)));
     }
     if loose.is_empty() || !allowance.may_stop_for(Step::Remake) {
         return Ok(None);
@@ -235,8 +239,9 @@ fn plan_or_changes<T>(
             },
             Next::None(failure) => {
                 let failure = learned.failure.after(failure);
+                let longer = longer::for_connectors(ctx, division, &failure.apart, allowance)?;
                 let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
-                Found::nothing(failure).with(change)
+                Found::nothing(failure).with(longer).with(change)
             }
         },
     ))
@@ -258,17 +263,21 @@ fn learn(
         Found::nothing(Failure::default())
     } else if kit.only_rattles() {
         // The search already chose the plan with the least rattling, so only other pieces help.
-        let rattling: Vec<PatchId> = kit
+        let rattling: Vec<(PatchId, f64)> = kit
             .rattling_pieces()
             .into_iter()
-            .map(|piece| kit.handover.patch(piece))
+            .map(|(piece, excess)| (kit.handover.patch(piece), excess))
             .collect();
-        let change = match allowance.is_wanted(Step::JoinRattling) {
-            true => join(ctx, &division.settings.segmentation, &division.surface, &rattling)?,
+        let longer = longer::for_play(ctx, division, &rattling, allowance)?;
+        let patches: Vec<PatchId> = rattling.iter().map(|r| r.0).collect();
+        let fewer = match allowance.is_wanted(Step::JoinRattling) {
+            true => join(ctx, &division.settings.segmentation, &division.surface, &patches)?,
             false => None,
         };
-        let change = change.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
-        Found::nothing(Failure::of("pieces rattle")).with(change)
+        let fewer = fewer.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
+        Found::nothing(Failure::of("pieces rattle"))
+            .with(longer)
+            .with(fewer)
     } else {
         learn_and_remake(ctx, division, learned, &kit.lessons(), allowance)?
     };
@@ -364,14 +373,16 @@ pub(super) fn next_plan(
     let choice = planning.choice(&handling, of_other_sizes.as_ref(), allowance.kit_reserve_s);
     ctx.stage("expected play", 0)?;
     let foresight = Foresight::of(&choice, &found);
+    let rattling = foresight.rattlers();
+    let longer = longer::for_play(ctx, division, &rattling, allowance)?;
+    if let Some(longer) = longer {
+        return Ok(Next::Changes(vec![longer], None));
+    }
     let mut late = None;
-    if allowance.is_wanted(Step::JoinPredicted)
-        && let rattling = foresight.rattlers()
-        && !rattling.is_empty()
-    {
+    if allowance.is_wanted(Step::JoinPredicted) && !rattling.is_empty() {
         late = allowance.late(Step::JoinPredicted);
         if late.is_none()
-            && let Some(fewer) = join(ctx, &settings.segmentation, surface, loosest_half(&rattling))?
+            && let Some(fewer) = join(ctx, &settings.segmentation, surface, &loosest_half(&rattling))?
         {
             let change = Change::Divide(Step::JoinPredicted, fewer, None);
             return Ok(Next::Changes(vec![change], None));
@@ -408,8 +419,9 @@ pub(super) fn next_plan(
 
 /// The pieces to join first of those that would rattle, which come loosest first. Each that is joined holds
 /// its neighbours better, too, so the others may need no joining.
-fn loosest_half(rattling: &[PatchId]) -> &[PatchId] {
-    &rattling[..rattling.len().div_ceil(2)]
+fn loosest_half(rattling: &[(PatchId, f64)]) -> Vec<PatchId> {
+    let half = &rattling[..rattling.len().div_ceil(2)];
+    half.iter().map(|r| r.0).collect()
 }
 
 /// Searches for the cheapest plans, or for the reason why there is none. Most plans are changed before one is
@@ -427,12 +439,14 @@ fn search(ctx: &Ctx, planning: &Planning<'_>) -> Result<Result<Box<FoundPlan>, F
                 reason,
                 blockers,
                 articulations,
+                apart,
             } => {
                 let blocked = blockers.iter().map(|b| b.piece);
                 let suspects = articulations.into_iter().chain(blocked).collect();
                 let back = planning.turn.inverse();
                 Err(Failure {
                     suspects,
+                    apart,
                     reason,
                     blockers: blockers.into_iter().map(|b| b.rotate(&back)).collect(),
                     ..Failure::default()

@@ -10,6 +10,8 @@ pub(super) struct Failure {
     pub blockers: Vec<Blocker>,
     /// Pieces whose division may help, most promising first.
     pub suspects: Vec<PatchId>,
+    /// Pieces whose seams are too short for connectors.
+    pub apart: Vec<PatchId>,
     /// Pieces that came out loose in the last kit.
     pub loose: Vec<PatchId>,
 }

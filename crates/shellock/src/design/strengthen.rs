@@ -7,6 +7,7 @@
 use super::agenda::{Allowance, Permit, Step};
 use super::causes::Cause;
 use super::division::Division;
+use super::longer;
 use super::planning::Planning;
 use super::trial::Change;
 use super::wall::Thicker;
@@ -104,7 +105,17 @@ pub(super) fn strengthen(
     {
         changes.push(Change::Enlarge(sizes));
     } else if allowance.is_allowed(Step::JoinWeak) && before < ONCE && changes.is_empty() && !stand.is_early {
-        // Fewer pieces are the last resort, so the climb comes before.
+        // Fewer pieces are the last resort, so the climb and longer seams come before.
+        let between = weakest.first.map(|first| first.between);
+        if let Some(between) = between.filter(|pair| !pair.contains(&stand.plan.plan.key())) {
+            changes.extend(longer::for_load(
+                ctx,
+                division,
+                between,
+                (before, ONCE),
+                allowance,
+            )?);
+        }
         changes.extend(join(ctx, division, stand.plan.plan.key(), weakest)?);
     }
     Ok((changes, late))

@@ -69,12 +69,13 @@ fn a_slight_rattle_is_worth_no_other_kit() {
     };
     let (slight, strong) = (passing(1.1), passing(1.3));
     assert!(slight.is_firm() && !slight.only_rattles() && slight.rattling_pieces().is_empty());
-    assert!(!strong.is_firm() && strong.only_rattles() && strong.rattling_pieces() == [PatchId(1)]);
+    assert!(!strong.is_firm() && strong.only_rattles());
+    assert!(matches!(strong.rattling_pieces()[..], [(PatchId(1), _)]));
 }
 
 #[test]
 fn a_key_that_rattles_is_nobody_to_join() {
-    assert_eq!(kit_that_rattles(2, 3.0).rattling_pieces(), []);
+    assert!(kit_that_rattles(2, 3.0).rattling_pieces().is_empty());
     assert!(
         kit_that_rattles(2, 3.0).only_rattles()
             && kit_that_rattles(2, 1.5).only_rattles()

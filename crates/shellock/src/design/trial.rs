@@ -264,7 +264,7 @@ impl<'a> Trial<'a> {
             .zip(setup)
             .expect("pieces are changed of a model that is divided");
         let Some(next) = setup.candidate.divide(ctx, job, surface)? else {
-            if matches!(step, Step::JoinPredicted | Step::JoinWeak) {
+            if matches!(step, Step::Lengthen | Step::JoinPredicted | Step::JoinWeak) {
                 agenda.forgo(step);
                 setup.begin_division();
                 return Ok(None);
@@ -276,6 +276,7 @@ impl<'a> Trial<'a> {
         let (n, before) = (next.surface.n_patches, setup.division.surface.n_patches);
         ctx.note(&match (&warning, step) {
             (Some(warning), _) => format!("{warning}: {n} pieces"),
+            (None, Step::Lengthen) => "pieces would come loose: trying longer seams".to_owned(),
             (None, Step::JoinPredicted) => {
                 format!("pieces would rattle: trying {n} pieces instead of {before}")
             }

@@ -12,6 +12,8 @@ pub(in crate::design) enum Step {
     Remake,
     /// Enlarges connectors, since seams would open under a load.
     Enlarge,
+    /// Lengthens the seams of pieces that rattle, part under a load, or have no room for connectors.
+    Lengthen,
     /// Joins pieces that are predicted to rattle.
     JoinPredicted,
     /// Joins two pieces that part under a load.
@@ -67,10 +69,11 @@ pub(super) const ANY: usize = usize::MAX;
 
 /// Limits of all steps. A plan that is given up costs seconds, a joining that is predicted costs a search,
 /// and a kit costs most of a minute.
-pub(super) const TABLE: [Row; 11] = [
+pub(super) const TABLE: [Row; 12] = [
     row(Step::Replan, Level::Plan, Level::Division, [7, 7]),
     row(Step::Remake, Level::Plan, Level::Division, [1, ANY]),
     row(Step::Enlarge, Level::Division, Level::Key, [2, 2]),
+    row(Step::Lengthen, Level::Division, Level::Key, [4, 4]),
     row(Step::JoinPredicted, Level::Division, Level::Key, [5, 5]),
     row(Step::JoinWeak, Level::Division, Level::Key, [1, 1]),
     row(Step::JoinRattling, Level::Division, Level::Key, [2, 2]),
@@ -99,6 +102,7 @@ impl Step {
             Self::Replan => "try another plan, as a piece could not take its wall along",
             Self::Remake => "make the kit of another plan",
             Self::Enlarge => "try larger connectors where seams would open",
+            Self::Lengthen => "lengthen seams of pieces that would come loose",
             Self::JoinPredicted => "join pieces that would rattle",
             Self::JoinWeak => "join pieces that part under a load",
             Self::JoinRattling => "join pieces that rattle",

@@ -1,0 +1,85 @@
+//! Longer seams for pieces that rattle, that part under a load, or that have no room for connectors.
+
+use super::DesignError;
+use super::agenda::{Allowance, Step};
+use super::division::Division;
+use super::trial::Change;
+use crate::metric::SURE_PLAY;
+use crate::segmentation::{Wish, lengthen};
+use crate::{Ctx, PatchId};
+
+/// Growth wanted of seams that are too short for connectors.
+const FOR_CONNECTORS: f64 = 2.0;
+
+/// Offers longer seams for pieces that rattle, with the ratios of their play to what is allowed.
+pub(super) fn for_play(
+    ctx: &Ctx,
+    division: &Division,
+    rattling: &[(PatchId, f64)],
+    allowance: &Allowance,
+) -> Result<Option<Change>, DesignError> {
+    // Play falls about as seams grow.
+    let wish = |&(piece, excess): &(PatchId, f64)| Wish {
+        piece,
+        growth: excess / SURE_PLAY,
+    };
+    offer(ctx, division, rattling.iter().map(wish).collect(), allowance)
+}
+
+/// Offers longer seams for pieces that no connector joins to most others.
+pub(super) fn for_connectors(
+    ctx: &Ctx,
+    division: &Division,
+    apart: &[PatchId],
+    allowance: &Allowance,
+) -> Result<Option<Change>, DesignError> {
+    let wish = |&piece: &PatchId| Wish {
+        piece,
+        growth: FOR_CONNECTORS,
+    };
+    offer(ctx, division, apart.iter().map(wish).collect(), allowance)
+}
+
+/// Offers a longer seam between two pieces that part under `factor` times a load, where `asked` times it is
+/// asked. The border of the smaller one moves.
+pub(super) fn for_load(
+    ctx: &Ctx,
+    division: &Division,
+    between: [PatchId; 2],
+    (factor, asked): (f64, f64),
+    allowance: &Allowance,
+) -> Result<Option<Change>, DesignError> {
+    let surface = &division.surface;
+    let area_mm2 = |piece: PatchId| -> f64 {
+        let own = (surface.patch_of_face.iter().enumerate()).filter(|(_, p)| **p == piece);
+        own.map(|(f, _)| surface.mesh.face_area(f)).sum()
+    };
+    let [a, b] = between;
+    let piece = if area_mm2(a) <= area_mm2(b) { a } else { b };
+    let growth = (asked / factor).min(FOR_CONNECTORS);
+    offer(ctx, division, vec![Wish { piece, growth }], allowance)
+}
+
+/// Offers longer seams; `None` if that is not allowed, or if no border within reach is longer.
+fn offer(
+    ctx: &Ctx,
+    division: &Division,
+    mut wishes: Vec<Wish>,
+    allowance: &Allowance,
+) -> Result<Option<Change>, DesignError> {
+    let settings = &division.settings;
+    // A key that is cut stays where it is.
+    let key = settings.plan.key.filter(|_| settings.plan.key_slide.is_some());
+    wishes.retain(|wish| Some(wish.piece) != key);
+    if wishes.is_empty() || !allowance.is_allowed(Step::Lengthen) {
+        return Ok(None);
+    }
+    let longer = lengthen(
+        &ctx.fork(),
+        &settings.segmentation,
+        &division.surface,
+        &wishes,
+        key,
+    )?;
+    Ok(longer.map(|surface| Change::Divide(Step::Lengthen, surface, None)))
+}
