@@ -296,6 +296,67 @@ mod tests {
         );
     }
 
+    /// The search for the farthest motion misses little of what a dense set of directions finds, and finds
+    /// about as much in the same contacts when they are turned.
+    #[test]
+    fn play_is_that_of_the_farthest_motion_however_the_contacts_lie() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let dense: Vec<Vec3> = (0..400)
+            .map(|_| (Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0).normalize())
+            .collect();
+        let mut n_held = 0;
+        for n in [20, 40, 80, 80, 160, 160] {
+            let mut contacts = random_contacts(&mut rng, 2, n);
+            contacts.iter_mut().for_each(|c| {
+                c.point *= 20.0;
+                c.gap_mm = 0.05 + 0.1 * rng.random::<f64>();
+            });
+            let [shift_mm, turn_deg] = farthest(PatchId(1), &contacts, Vec3::ZERO);
+            if shift_mm > 50.0 || turn_deg > 50.0 {
+                continue;
+            }
+            n_held += 1;
+            let system = System::new(&contacts, &[PatchId(1)], 50.0, Freedom::Rigid);
+            let gaps: Vec<f64> = system.rows.iter().map(|r| contacts[r.contact].gap_mm).collect();
+            let limits = Limits::new(&system, &gaps);
+            let mut corner = Corner::new(&limits);
+            let mut most = |from: usize, scale: f64| {
+                let along = |d: &Vec3| {
+                    let form = |k: usize, _| {
+                        if (from..from + 3).contains(&k) {
+                            scale * d[k - from]
+                        } else {
+                            0.0
+                        }
+                    };
+                    corner.farthest(&DVector::from_fn(6, form)).unwrap()
+                };
+                dense.iter().map(along).fold(0.0, f64::max)
+            };
+            let [dense_mm, dense_deg] = [most(0, 1.0), most(3, 1.0 / 50.0).to_degrees()];
+            assert!(shift_mm > 0.97 * dense_mm, "{shift_mm} {dense_mm}");
+            assert!(turn_deg > 0.97 * dense_deg, "{turn_deg} {dense_deg}");
+            // No direction is farther from the dense ones than some degrees.
+            assert!(shift_mm < 1.1 * dense_mm, "{shift_mm} {dense_mm}");
+            let turn = |v: Vec3| Vec3::new(0.6 * v.x - 0.8 * v.y, 0.8 * v.x + 0.6 * v.y, v.z);
+            let turned: Vec<Contact> = contacts
+                .iter()
+                .map(|c| Contact {
+                    point: turn(c.point),
+                    normal: turn(c.normal),
+                    ..*c
+                })
+                .collect();
+            let [again_mm, again_deg] = farthest(PatchId(1), &turned, Vec3::ZERO);
+            assert!((again_mm / shift_mm - 1.0).abs() < 0.05, "{again_mm} {shift_mm}");
+            assert!(
+                (again_deg / turn_deg - 1.0).abs() < 0.05,
+                "{again_deg} {turn_deg}"
+            );
+        }
+        assert!(n_held >= 4, "{n_held}");
+    }
+
     /// Contacts on the six faces of a box around `center`, with normals outwards.
     fn box_contacts(a: u32, b: u32, center: Vec3) -> Vec<Contact> {
         let mut contacts = Vec::new();

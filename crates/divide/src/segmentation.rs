@@ -6,6 +6,7 @@
 //! locks (see [`shellock_surface::seam::graph`]).
 
 mod changes;
+mod coarsen;
 mod creases;
 mod cut;
 mod dual_graph;
@@ -28,6 +29,7 @@ mod user;
 
 use changes::Changes;
 pub use changes::tell;
+pub use coarsen::coarsen;
 pub use creases::usual_n_pieces;
 pub use error::SegmentationError;
 use fewer::{disagreement, with_fewer_parts};

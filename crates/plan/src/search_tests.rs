@@ -214,10 +214,14 @@ fn where_one_piece_joins_two_parts_no_plan_locks() {
         let constraints = PlanConstraints::default();
         let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
         assert_eq!(brute_force(&space, &choices(&params, &survey)), None);
-        let PlanOutcome::Infeasible { articulations, .. } = run_search(&params, &survey, &constraints) else {
+        let PlanOutcome::Infeasible {
+            articulations, apart, ..
+        } = run_search(&params, &survey, &constraints)
+        else {
             panic!("an articulation piece lets no plan lock")
         };
         assert_eq!(articulations, [PatchId(2)]);
+        assert_eq!(apart, [PatchId(3), PatchId(4)]);
     }
 }
 
@@ -280,10 +284,10 @@ fn what_earlier_rounds_forbid_is_kept_to() {
         .iter()
         .filter(|c| c.a == PatchId(0))
         .for_each(|c| constraints.weaken(c.a, c.b));
-    assert!(matches!(
-        run_search(&params, &survey, &constraints),
-        PlanOutcome::Infeasible { .. }
-    ));
+    let PlanOutcome::Infeasible { apart, .. } = run_search(&params, &survey, &constraints) else {
+        panic!("a piece that joins nothing lets no plan lock")
+    };
+    assert_eq!(apart, [PatchId(0)]);
 }
 
 #[test]

@@ -21,24 +21,7 @@ impl Term {
             stiffness,
         }
     }
-
-    /// Returns the term with no more stiffness against the motion of any of its points than `most_n_mm`.
-    /// Rigid motions still cost no energy.
-    fn no_stiffer_than(self, most_n_mm: f64) -> Self {
-        let steepest = self.corners.iter().map(|c| c.1.length_squared());
-        let own_n_mm = self.stiffness * steepest.fold(0.0, f64::max);
-        let stiffness = match own_n_mm > most_n_mm {
-            true => self.stiffness * most_n_mm / own_n_mm,
-            false => self.stiffness,
-        };
-        Self { stiffness, ..self }
-    }
 }
-
-/// Greatest stiffness of a term, as a multiple of the wall's modulus times its thickness. Triangles of some
-/// µm, to which a fold of a coarse mesh may shrink, would have 10¹⁰ times that, and no system with such terms
-/// can be solved; usual ones have up to 10.
-const STIFFEST: f64 = 1e4;
 
 /// Bending stiffness of a plate of thickness `thickness_mm`, N mm.
 pub(super) fn bending_stiffness(params: &SurfaceParams, thickness_mm: f64) -> f64 {
@@ -111,11 +94,7 @@ pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, poin
             terms.extend(hinge(points, [ends[0], ends[1], x.1, y.1], stiffness));
         }
     }
-    let most_n_mm = STIFFEST * params.material.youngs_modulus_mpa * params.wall_mm;
     terms
-        .into_iter()
-        .map(|term| term.no_stiffer_than(most_n_mm))
-        .collect()
 }
 
 /// Motion of a point of a rigid strip, linear in the motion of the patch at its seam point: the strip moves

@@ -19,7 +19,7 @@ pub(super) const COST_SLACK: f64 = 0.25;
 
 /// Share of the allowed play below which pieces hardly ever rattle. Four of five finished pieces have 0.74 to
 /// 1.2 times the predicted play.
-pub const SURE_PLAY: f64 = 0.85;
+const SURE_PLAY: f64 = 0.85;
 
 /// Share of the allowed play above which pieces of a plan are expected to rattle too much. It lies below
 /// [`SLIGHT`], since runs may come out shorter than planned.
@@ -104,11 +104,20 @@ impl Foresight {
     }
 
     /// Pieces but the key that are expected to rattle too much even in the plan whose loosest piece has the
-    /// least play, the loosest first.
+    /// least play, the loosest first. Each comes with its play, as a share of the allowed play.
     pub fn rattlers(&self) -> Vec<(PatchId, f64)> {
+        self.wider_than(LIKELY_RATTLE)
+    }
+
+    /// Pieces but the key with more play than surely passes in that plan, the loosest first, likewise.
+    pub fn doubtful(&self) -> Vec<(PatchId, f64)> {
+        self.wider_than(SURE_PLAY)
+    }
+
+    fn wider_than(&self, most: f64) -> Vec<(PatchId, f64)> {
         let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| {
-            loosest_first(plan.plan.key(), excess, LIKELY_RATTLE)
+            loosest_first(plan.plan.key(), excess, most)
         })
     }
 

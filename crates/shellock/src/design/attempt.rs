@@ -374,8 +374,10 @@ pub(super) fn next_plan(
     ctx.stage("expected play", 0)?;
     let foresight = Foresight::of(&choice, &found);
     let rattling = foresight.rattlers();
-    let longer = longer::for_play(ctx, division, &rattling, allowance)?;
-    if let Some(longer) = longer {
+    // Once a border moves, all that are in doubt do.
+    if !rattling.is_empty()
+        && let Some(longer) = longer::for_play(ctx, division, &foresight.doubtful(), allowance)?
+    {
         return Ok(Next::Changes(vec![longer], None));
     }
     let mut late = None;

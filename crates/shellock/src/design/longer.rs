@@ -4,10 +4,11 @@ use super::DesignError;
 use super::agenda::{Allowance, Step};
 use super::division::Division;
 use super::trial::Change;
-use crate::metric::SURE_PLAY;
 use crate::segmentation::{Wish, lengthen};
 use crate::{Ctx, PatchId};
 
+/// Play that is aimed at, as a share of the allowed play; 0.85 surely passes.
+const AIM: f64 = 0.7;
 /// Growth wanted of seams that are too short for connectors.
 const FOR_CONNECTORS: f64 = 2.0;
 
@@ -21,7 +22,7 @@ pub(super) fn for_play(
     // Play falls about as seams grow.
     let wish = |&(piece, excess): &(PatchId, f64)| Wish {
         piece,
-        growth: excess / SURE_PLAY,
+        growth: excess / AIM,
     };
     offer(ctx, division, rattling.iter().map(wish).collect(), allowance)
 }

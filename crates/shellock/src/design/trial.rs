@@ -20,7 +20,7 @@ use crate::metric::EvenSurface;
 use crate::plan::lesson::Lesson;
 use crate::plan::{self, LatticePlan, PlanConstraints, PlanSurvey};
 use crate::sizes::ChosenSizes;
-use crate::{Ctx, SegmentedSurface, Warning};
+use crate::{Ctx, SegmentedSurface, Warning, segmentation};
 
 /// A change of a trial, with the data that it needs.
 pub(super) enum Change {
@@ -263,6 +263,7 @@ impl<'a> Trial<'a> {
         let (job, setup) = job
             .zip(setup)
             .expect("pieces are changed of a model that is divided");
+        let surface = segmentation::coarsen(&setup.candidate.surface, surface);
         let Some(next) = setup.candidate.divide(ctx, job, surface)? else {
             if matches!(step, Step::Lengthen | Step::JoinPredicted | Step::JoinWeak) {
                 agenda.forgo(step);
