@@ -32,6 +32,9 @@ pub enum Cause {
     LabelsJoined {
         labels: Vec<i64>,
     },
+    BordersMoved {
+        share: f64,
+    },
     ShortContacts {
         from_mm: f64,
         to_mm: f64,
@@ -125,6 +128,14 @@ impl Diagnostic for Cause {
                     ),
                 )
             }
+            Self::BordersMoved { share } => Told::note(
+                "borders-moved",
+                format!(
+                    "{:.0} % of the surface is in another piece than your labels say: borders were moved to \
+                     where seams are long enough",
+                    100.0 * share
+                ),
+            ),
             Self::ShortContacts { from_mm, to_mm } => Told::warning(
                 "short-contacts",
                 format!(

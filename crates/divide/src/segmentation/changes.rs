@@ -12,12 +12,17 @@ use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, re
 /// less.
 const MAIN_SHARE: f64 = 0.5;
 
+/// Share of the surface that must have changed its piece to be reported.
+const MOVED_SHARE: f64 = 0.02;
+
 /// Correspondence of labels and pieces.
 pub(super) struct Changes {
     /// For each label, the pieces that belong mainly to it.
     pieces_of: Vec<Vec<PatchId>>,
     /// For each piece, the labels that lie mainly in it, and the one in which it mainly lies.
     labels_of: Vec<Vec<usize>>,
+    /// Share of the surface in a piece that its label neither owns nor shares.
+    moved_share: f64,
 }
 
 impl Changes {
@@ -47,9 +52,16 @@ impl Changes {
                 .filter(move |&l| is_within(l, piece) || is_own(l, piece))
                 .collect()
         };
+        let labels_of: Vec<Vec<usize>> = (0..n_pieces).map(within).collect();
+        let of_other = |piece: usize| -> f64 {
+            let others = (0..n_labels).filter(|label| !labels_of[piece].contains(label));
+            others.map(|label| common[label][piece]).sum()
+        };
+        let moved_mm2: f64 = (0..n_pieces).map(of_other).sum();
         Self {
             pieces_of: (0..n_labels).map(own).collect(),
-            labels_of: (0..n_pieces).map(within).collect(),
+            moved_share: moved_mm2 / of_label.iter().sum::<f64>().max(f64::MIN_POSITIVE),
+            labels_of,
         }
     }
 
@@ -63,7 +75,7 @@ impl Changes {
 }
 
 /// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]),
-/// divided (`piece-split`) or joined (`piece-joined`); regions to keep whole that were cut
+/// divided (`piece-split`) or joined (`piece-joined`), or whose borders moved (`borders-moved`); regions to keep whole that were cut
 /// (`keep-whole-cut`); contacts shorter than wanted (`short-contacts`); and pieces that are still the only
 /// link to others (`weak-graph`).
 pub fn tell(
@@ -79,6 +91,10 @@ pub fn tell(
         let changes = Changes::between(&cleaned, surface);
         tell_divisions(ctx, &changes, &names, surface);
         tell_joins(ctx, &changes, &names, surface);
+        if changes.moved_share > MOVED_SHARE {
+            let share = changes.moved_share;
+            ctx.warn(Warning::new(Cause::BordersMoved { share }, Vec::new(), None));
+        }
     }
     let keep = resolve_regions(&params.keep_whole, solid, labels)?;
     tell_cut(ctx, &keep, surface);

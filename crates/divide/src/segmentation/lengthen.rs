@@ -222,13 +222,17 @@ mod tests {
     use shellock_testkit::shapes::torus;
 
     use super::*;
-    use crate::segmentation::smooth_and_cut;
+    use crate::segmentation::{smooth_and_cut, tell};
 
     /// Radius of the ring's tube, mm, and how much of it a pinch leaves.
     const TUBE_MM: f64 = 10.0;
 
     /// A ring in two halves, cut at both ends of the x axis, where the tube has `pinched` times its radius.
     fn ring(pinched: f64) -> SegmentedSurface {
+        ring_with_labels(pinched).2
+    }
+
+    fn ring_with_labels(pinched: f64) -> (Solid, Vec<i64>, SegmentedSurface) {
         let mut ring = torus(30.0, TUBE_MM, [144, 48]);
         for p in &mut ring.points {
             let axis = Vec3::new(p.x, p.y, 0.0).normalize_or_zero() * 30.0;
@@ -239,7 +243,8 @@ mod tests {
         let half = |f| u32::from(solid.mesh().face_center(f).y > 0.0);
         let label: Vec<u32> = (0..solid.mesh().triangles.len()).map(half).collect();
         let labels = FaceLabels::from_components(&Topology::new(&solid), &label);
-        smooth_and_cut(&Ctx::quiet(), &params(), &solid, &labels).unwrap()
+        let surface = smooth_and_cut(&Ctx::quiet(), &params(), &solid, &labels).unwrap();
+        (solid, label.into_iter().map(i64::from).collect(), surface)
     }
 
     fn params() -> SegmentationParams {
@@ -290,6 +295,20 @@ mod tests {
             let exact = -6.0 * (-((1.0 - share) / 0.5).ln()).sqrt();
             assert!((y - exact).abs() < 2.0, "{y} {exact}");
         }
+    }
+
+    #[test]
+    fn people_are_told_how_much_of_their_labels_moved() {
+        let (solid, labels, before) = ring_with_labels(0.5);
+        let told = |surface: &SegmentedSurface| {
+            let ctx = Ctx::quiet();
+            tell(&ctx, &params(), &solid, Some(&labels), surface).unwrap();
+            let warnings = ctx.into_warnings();
+            warnings.iter().map(|w| w.code().to_owned()).collect::<Vec<_>>()
+        };
+        assert!(!told(&before).contains(&"borders-moved".to_owned()));
+        let after = longer(&before, 1.6, None).unwrap();
+        assert!(told(&after).contains(&"borders-moved".to_owned()));
     }
 
     #[test]

@@ -106,18 +106,9 @@ impl Foresight {
     /// Pieces but the key that are expected to rattle too much even in the plan whose loosest piece has the
     /// least play, the loosest first. Each comes with its play, as a share of the allowed play.
     pub fn rattlers(&self) -> Vec<(PatchId, f64)> {
-        self.wider_than(LIKELY_RATTLE)
-    }
-
-    /// Pieces but the key with more play than surely passes in that plan, the loosest first, likewise.
-    pub fn doubtful(&self) -> Vec<(PatchId, f64)> {
-        self.wider_than(SURE_PLAY)
-    }
-
-    fn wider_than(&self, most: f64) -> Vec<(PatchId, f64)> {
         let steadiest = self.steadiest();
         steadiest.map_or_else(Vec::new, |(plan, excess)| {
-            loosest_first(plan.plan.key(), excess, most)
+            loosest_first(plan.plan.key(), excess, LIKELY_RATTLE)
         })
     }
 
