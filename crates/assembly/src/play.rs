@@ -85,7 +85,8 @@ pub struct KitPlay {
     /// Play of each piece for small motions, neglecting the effects of sideways motions and rotations. Closer
     /// to the real play than the proven one, but on its lower side.
     pub estimates: IdVec<PatchId, Option<Play>>,
-    /// Small motions of each piece that reach this play: displacement of its centroid, mm, and rotation, rad.
+    /// Small motions of each piece that go farthest along and about the coordinate axes: displacement of its
+    /// centroid, mm, and rotation, rad.
     pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
     /// Ways on which pieces other than the key can be taken out by hand. `None` if no search was made, see
     /// [`look_for_ways_out`].

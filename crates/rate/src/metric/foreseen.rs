@@ -24,8 +24,8 @@ use super::PlanModel;
 
 /// Predicted play of each piece, and its ratio to the allowed play: at most 1 where allowed.
 pub struct Foreseen {
-    /// Displacement of the middle of each piece's surface, mm, and turn, degrees. Each is no less than the
-    /// greatest along the coordinate axes and no more than √3 of that.
+    /// Displacement of the middle of each piece's surface, mm, and turn, degrees, of the motions that go
+    /// farthest.
     pub play: Vec<[f64; 2]>,
     /// Ratio of each piece's play to the allowed play, in the same order.
     pub excess: Vec<f64>,

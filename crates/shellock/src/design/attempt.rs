@@ -9,7 +9,7 @@ use super::kit::{Recipe, make};
 use super::longer;
 use super::planning::Planning;
 use super::strengthen::strengthen;
-use super::trial::{Change, Former, Learned, Parts};
+use super::trial::{Change, Learned, Parts};
 use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
 use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams, Stand};
@@ -21,10 +21,6 @@ use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 /// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves
 /// the optimum of a koala in ten pieces, but not that of a bunny in twelve.
 const SHARE_WHILE_PLANNING: usize = 10;
-
-/// Play of the loosest piece, as a multiple of that before seams were lengthened, from which no seams are
-/// lengthened again: neighbours leave no more room.
-const LONGER_HELPS: f64 = 0.9;
 
 /// Result of an attempt.
 pub(super) struct Found<T> {
@@ -361,7 +357,7 @@ pub(super) fn next_plan(
     ctx: &Ctx,
     planning: &Planning<'_>,
     allowance: &Allowance,
-    former: &mut Former,
+    former: &mut Option<LatticePlan>,
 ) -> Result<Next, DesignError> {
     let division = planning.division;
     let (surface, settings) = (&division.surface, &division.settings);
@@ -373,16 +369,12 @@ pub(super) fn next_plan(
         Err(failure) => return Ok(Next::None(failure)),
     };
     let handling = planning.handling();
-    let of_other_sizes = former.plan.take();
+    let of_other_sizes = former.take();
     let choice = planning.choice(&handling, of_other_sizes.as_ref(), allowance.kit_reserve_s);
     ctx.stage("expected play", 0)?;
     let foresight = Foresight::of(&choice, &found);
     let rattling = foresight.rattlers();
-    if let Some(&(_, widest)) = rattling.first()
-        && former.widest.is_none_or(|before| widest < LONGER_HELPS * before)
-        && let Some(longer) = longer::for_play(ctx, division, &rattling, allowance)?
-    {
-        former.widest = Some(widest);
+    if let Some(longer) = longer::for_play(ctx, division, &rattling, allowance)? {
         return Ok(Next::Changes(vec![longer], None));
     }
     let mut late = None;
@@ -399,7 +391,7 @@ pub(super) fn next_plan(
         if !stand.is_early {
             ctx.note(&words_of_least(&stand.bears, allowance.least_factor));
         }
-        former.plan = Some(stand.plan.plan.clone());
+        *former = Some(stand.plan.plan.clone());
         match strengthen(ctx, planning, &handling, &stand, allowance) {
             Ok((changes, late_change)) => {
                 // The climb may still reach what is asked, so an early look rules nothing out.

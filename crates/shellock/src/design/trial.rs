@@ -68,16 +68,8 @@ pub(super) struct Setup<'a> {
     pub grid: WallGrid,
     pub survey: Option<PlanSurvey>,
     pub lessons: Learned,
-    pub former: Former,
-}
-
-/// Results of former plans with the present key.
-#[derive(Default)]
-pub(super) struct Former {
     /// Strongest plan of the present pieces with other connectors.
-    pub plan: Option<LatticePlan>,
-    /// Play of the loosest piece before its seams were lengthened last, as a share of what is allowed.
-    pub widest: Option<f64>,
+    pub former: Option<LatticePlan>,
 }
 
 /// Layers of a trial that kits are made from.
@@ -250,7 +242,7 @@ impl<'a> Trial<'a> {
             grid: WallGrid::default(),
             survey: None,
             lessons: Learned::default(),
-            former: Former::default(),
+            former: None,
         };
         setup.begin_division();
         self.setup = Some(setup);
@@ -322,7 +314,7 @@ impl Setup<'_> {
 
     /// Forgets measurements and lessons of other pieces.
     fn begin_division(&mut self) {
-        (self.even, self.former.plan) = (None, None);
+        (self.even, self.former) = (None, None);
         self.grid.begin_division();
         self.begin_sizes();
     }
