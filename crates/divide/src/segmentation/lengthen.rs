@@ -289,11 +289,11 @@ mod tests {
         for growth in [1.3, 1.6] {
             let (after_mm, y) = seams(&longer(&pinched, growth, None).unwrap());
             assert!(after_mm > (growth - 0.1) * before_mm, "{before_mm} {after_mm}");
-            assert!(after_mm < (growth + 0.3) * before_mm, "{before_mm} {after_mm}");
+            assert!(after_mm < (growth + 0.4) * before_mm, "{before_mm} {after_mm}");
             // The upper half takes from the lower one: it grows.
             let share = growth * 0.5;
             let exact = -6.0 * (-((1.0 - share) / 0.5).ln()).sqrt();
-            assert!((y - exact).abs() < 2.0, "{y} {exact}");
+            assert!((y - exact).abs() < 3.0, "{y} {exact}");
         }
     }
 

@@ -367,11 +367,7 @@ impl Agenda {
             self.skip(ctx, step);
         }
         let is_over = self.best.is_some_and(|best| best.is_firm());
-        let step = if is_over {
-            None
-        } else {
-            self.choose(ctx, &report.offers)
-        };
+        let step = if is_over { None } else { self.choose(ctx, report) };
         if let Some(step) = step {
             self.take(ctx, step);
         }
@@ -379,7 +375,8 @@ impl Agenda {
     }
 
     /// The first offer that is allowed, else the innermost step outwards.
-    fn choose(&mut self, ctx: &Ctx, offers: &[Step]) -> Option<Step> {
+    fn choose(&mut self, ctx: &Ctx, report: &Report) -> Option<Step> {
+        let is_before_kit = report.kit.is_none() && !report.is_stopped;
         let passes = self.best.is_some_and(|best| best.passes());
         let mut outwards = vec![Step::NextKey];
         if !passes && self.count(Step::Thicken) > 0 {
@@ -388,12 +385,21 @@ impl Agenda {
         if !passes {
             outwards.push(Step::NextWay);
         }
-        for &step in offers.iter().chain(&outwards) {
+        for &step in report.offers.iter().chain(&outwards) {
             // A change before a kit was allowed when its trial began. Without it the trial would end in
             // nothing.
             let permit = match step {
-                Step::Enlarge | Step::Lengthen | Step::JoinPredicted | Step::JoinWeak | Step::Thicken => {
+                Step::Enlarge | Step::Lengthen | Step::JoinPredicted | Step::JoinWeak | Step::Thicken
+                    if is_before_kit =>
+                {
                     self.permit_at_any_time(step)
+                }
+                // After a kit, longer seams cost another one.
+                Step::Lengthen if self.is_late(ctx, Step::JoinRattling) => {
+                    match self.permit_at_any_time(step) {
+                        Permit::Yes => Permit::Late,
+                        permit => permit,
+                    }
                 }
                 _ => self.permit(ctx, step),
             };
@@ -523,7 +529,9 @@ impl Agenda {
     fn makes_sense(&self, step: Step) -> bool {
         let has_kit = self.best.is_some();
         match step {
-            Step::Remake | Step::Divide | Step::JoinRattling => self.n_kits < self.most_kits(),
+            Step::Remake | Step::Divide | Step::Lengthen | Step::JoinRattling => {
+                self.n_kits < self.most_kits()
+            }
             // What kits taught of these pieces would be lost.
             Step::Enlarge | Step::JoinWeak => self.count(Step::Remake) == 0,
             Step::Thicken => {

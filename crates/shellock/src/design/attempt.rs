@@ -241,7 +241,17 @@ fn plan_or_changes<T>(
                 let failure = learned.failure.after(failure);
                 let longer = longer::for_connectors(ctx, division, &failure.apart, allowance)?;
                 let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
-                Found::nothing(failure).with(longer).with(change)
+                let fewer = match allowance.is_wanted(Step::JoinPredicted) {
+                    true => join(
+                        ctx,
+                        &division.settings.segmentation,
+                        &division.surface,
+                        &failure.apart,
+                    )?,
+                    false => None,
+                };
+                let fewer = fewer.map(|surface| Change::Divide(Step::JoinPredicted, surface, None));
+                Found::nothing(failure).with(longer).with(change).with(fewer)
             }
         },
     ))

@@ -279,7 +279,7 @@ impl<'a> Trial<'a> {
             (Some(warning), _) => format!("{warning}: {n} pieces"),
             (None, Step::Lengthen) => "pieces would come loose: trying longer seams".to_owned(),
             (None, Step::JoinPredicted) => {
-                format!("pieces would rattle: trying {n} pieces instead of {before}")
+                format!("pieces would come loose: trying {n} pieces instead of {before}")
             }
             (None, _) => format!("trying other pieces: {n} instead of {before}"),
         });

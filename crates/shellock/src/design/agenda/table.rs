@@ -14,7 +14,7 @@ pub(in crate::design) enum Step {
     Enlarge,
     /// Lengthens the seams of pieces that rattle, part under a load, or have no room for connectors.
     Lengthen,
-    /// Joins pieces that are predicted to rattle.
+    /// Joins pieces that are predicted to rattle, or that have no room for connectors.
     JoinPredicted,
     /// Joins two pieces that part under a load.
     JoinWeak,
@@ -103,7 +103,7 @@ impl Step {
             Self::Remake => "make the kit of another plan",
             Self::Enlarge => "try larger connectors where seams would open",
             Self::Lengthen => "lengthen seams of pieces that would come loose",
-            Self::JoinPredicted => "join pieces that would rattle",
+            Self::JoinPredicted => "join pieces that would come loose",
             Self::JoinWeak => "join pieces that part under a load",
             Self::JoinRattling => "join pieces that rattle",
             Self::Divide => "try other pieces",
