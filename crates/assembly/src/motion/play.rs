@@ -200,7 +200,7 @@ impl Span {
     /// ways; `None` if it is unlimited.
     ///
     /// The length belongs to a motion that is allowed, so it is no more than the greatest one. In random
-    /// contacts it is the greatest one to 6 parts in a hundred (tests).
+    /// contacts it is nine tenths of the greatest one at least (tests).
     pub fn farthest(&self, corner: &mut Corner<'_>) -> Option<f64> {
         let mut best = Vec3::ZERO;
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
