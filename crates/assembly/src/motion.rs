@@ -102,7 +102,7 @@ fn centered(contacts: &[Contact], origin: Vec3) -> Vec<Contact> {
 /// mm, and rotation, degrees.
 ///
 /// Each belongs to a motion that the contacts allow, and does not depend on the coordinate axes but for the
-/// search ([`Span::farthest`]). Unlimited motions count as 100 mm and 1 rad.
+/// search. Unlimited motions count as 100 mm and 1 rad.
 pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
     /// Distance at which rotations count as displacements, mm.
     const LENGTH_MM: f64 = 50.0;

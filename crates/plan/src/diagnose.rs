@@ -50,8 +50,8 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     })
 }
 
-/// Pieces outside the largest group of pieces that neighbours join, while the pieces of `without` are away; of
-/// equal groups, the first counts.
+/// Pieces outside the largest group of pieces that neighbours join, while the pieces of `without` are away.
+/// Of equal groups, the first counts.
 fn apart(space: &Space<'_>, without: PieceSet) -> PieceSet {
     let present = space.all().minus(without);
     let group = |first: PatchId| {

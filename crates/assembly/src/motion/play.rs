@@ -175,7 +175,7 @@ fn scatter(i: usize) -> f64 {
 /// Vector of three consecutive unknowns of a motion: a displacement or a rotation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span {
-    /// Number of unknowns.
+    /// Number of unknowns of a motion.
     pub n: usize,
     /// First of the three unknowns.
     pub from: usize,
@@ -243,8 +243,9 @@ impl<'a> Corner<'a> {
             .map(|_| dot(objective.as_slice(), &self.x))
     }
 
-    /// Lengthens a vector that is linear in the motion, [`Span::of`], as far as the limits allow: each step goes
-    /// farthest along the vector that the last one reached, beginning with `start`. `None` if it is unlimited.
+    /// Lengthens a vector that is linear in the motion, [`Span::of`], as far as the limits allow. Each step
+    /// goes farthest along the vector that the last one reached, beginning with `start`. `None` if it is
+    /// unlimited.
     ///
     /// The result is the length for a motion that is allowed, and no other motion along it goes farther. A
     /// longer one may exist in another direction.

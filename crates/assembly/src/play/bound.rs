@@ -80,8 +80,8 @@ pub(super) struct Answer {
     /// Play of each free piece, neglecting the effects of sideways motions and rotations: displacement, mm,
     /// and rotation, rad. Empty if something is unlimited.
     pub linear: Vec<[f64; 2]>,
-    /// Motions of the only free piece that go farthest along the axes: displacement of its centre, mm, and rotation,
-    /// rad. Empty if several pieces are free.
+    /// Motions of the only free piece that go farthest along the axes: displacement of its centre, mm, and
+    /// rotation, rad. Empty if several pieces are free.
     pub swings: Vec<[f64; 6]>,
     /// Bearings that hold, of those whose barrier was computed in any round.
     pub bearings: BTreeSet<usize>,

@@ -75,9 +75,9 @@ impl Changes {
 }
 
 /// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]),
-/// divided (`piece-split`) or joined (`piece-joined`), or whose borders moved (`borders-moved`); regions to keep whole that were cut
-/// (`keep-whole-cut`); contacts shorter than wanted (`short-contacts`); and pieces that are still the only
-/// link to others (`weak-graph`).
+/// divided (`piece-split`) or joined (`piece-joined`), or whose borders moved (`borders-moved`); regions to
+/// keep whole that were cut (`keep-whole-cut`); contacts shorter than wanted (`short-contacts`); and pieces
+/// that are still the only link to others (`weak-graph`).
 pub fn tell(
     ctx: &Ctx,
     params: &SegmentationParams,

@@ -1,9 +1,9 @@
 //! Removal of cuts that no seam needs any more.
 //!
 //! Each change of a division smooths all seams, cuts triangles along them, and halves edges beside them.
-//! Without this, the triangles along former seams would stay, and ten changes would make a surface five times
-//! as large. So the part of each patch in each triangle of the first surface is drawn anew, with the points on
-//! its outline that a neighbour needs.
+//! Without this, the triangles along former seams would stay, and ten changes would make a surface five
+//! times as large. So the part of each patch in each triangle of the first surface is drawn anew, with the
+//! points on its outline that a neighbour needs.
 //!
 //! ```text
 //!      /|\               /\
@@ -319,7 +319,7 @@ mod tests {
             patch_of_face: turned.source_face.iter().map(patch).collect(),
             ..turned
         };
-        // The seams of the base lie along its edges, so no triangle of it is crossed; seams keep their points.
+        // The seams of the base lie along its edges, so they cross no triangle of it. They keep their points.
         let coarse = coarsen(&base, back);
         let topology = Topology::of_mesh(&base.mesh).unwrap();
         for f in 0..base.mesh.triangles.len() as u32 {

@@ -455,8 +455,9 @@ const LEAST_COSINE: f64 = 0.2;
 ///
 /// At ears and in ditches narrower than an edge a coarse mesh has a few such points in two thousand.
 fn relax_folds(mut mesh: TriMesh) -> TriMesh {
-    /// Greatest number of rounds; most folds are gone after two. Where a fold stays, as on a limb thinner than
-    /// an edge, more rounds would shrink the limb to a thread, whose triangles are too small to compute with.
+    /// Greatest number of rounds; most folds are gone after two. Where a fold stays, as on a limb thinner
+    /// than an edge, more rounds would shrink the limb to a thread, whose triangles are too small to compute
+    /// with.
     const MOST_ROUNDS: usize = 5;
     for _ in 0..MOST_ROUNDS {
         let normals = point_normals(&mesh);

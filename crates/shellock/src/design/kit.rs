@@ -133,7 +133,8 @@ impl Kit {
     }
 
     /// Pieces other than the key that rattle more than slightly, the loosest first. The key is left out
-    /// because it is cut where there is room for it. Each comes with the ratio of its play to what is allowed.
+    /// because it is cut where there is room for it. Each comes with the ratio of its play to what is
+    /// allowed.
     pub fn rattling_pieces(&self) -> Vec<(PatchId, f64)> {
         let pieces = self.strong_rattles().map(|r| (r.piece, r.excess));
         pieces.filter(|(piece, _)| *piece != self.plan.key()).collect()
