@@ -12,7 +12,7 @@ mod system;
 
 use forces::Balance;
 use nalgebra::DVector;
-pub(crate) use play::{Corner, Limits, Span};
+pub(crate) use play::{Corner, Limits, farthest_of_piece};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -119,18 +119,9 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
         .collect();
     let limits = Limits::new(&system, &gaps);
     let mut corner = Corner::new(&limits);
-    let mut most = |from: usize, scale: f64, end: f64| {
-        let span = Span {
-            n: system.n,
-            from,
-            scale,
-        };
-        span.farthest(&mut corner).map_or(end, |far| far.min(end))
-    };
-    [
-        most(0, 1.0, ENDLESS[0]),
-        most(3, 1.0 / LENGTH_MM, ENDLESS[1]).to_degrees(),
-    ]
+    let found = farthest_of_piece(&mut corner, LENGTH_MM);
+    let [shift_mm, turn] = [0, 1].map(|k| found[k].map_or(ENDLESS[k], |far| far.min(ENDLESS[k])));
+    [shift_mm, turn.to_degrees()]
 }
 
 /// Finds how the pieces not in `held` (of `n_pieces`) can move; empty if they cannot. With `leaves`, that
@@ -296,7 +287,7 @@ mod tests {
         );
     }
 
-    /// The search for the farthest motion finds nearly what a dense set of directions does, and
+    /// The search for the farthest motion finds nine tenths of what a dense set of directions does, and
     /// about as much in the same contacts when they are turned.
     #[test]
     fn play_is_that_of_the_farthest_motion_however_the_contacts_lie() {

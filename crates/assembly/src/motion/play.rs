@@ -172,15 +172,23 @@ fn scatter(i: usize) -> f64 {
     0.5 + 0.5 * ((i + 1) as f64 * 0.618_033_988_749_894_9).fract()
 }
 
+/// Lengths of the displacement, mm, and of the rotation, rad, in the motions of a single piece that go
+/// farthest; `None` where nothing limits them. Rotations count as displacements at `length_mm`. How they are
+/// sought: [`Span::farthest`].
+pub(crate) fn farthest_of_piece(corner: &mut Corner<'_>, length_mm: f64) -> [Option<f64>; 2] {
+    let n = corner.limits.n;
+    [(0, 1.0), (3, 1.0 / length_mm)].map(|(from, scale)| Span { n, from, scale }.farthest(corner))
+}
+
 /// Vector of three consecutive unknowns of a motion: a displacement or a rotation.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Span {
+struct Span {
     /// Number of unknowns of a motion.
-    pub n: usize,
+    n: usize,
     /// First of the three unknowns.
-    pub from: usize,
+    from: usize,
     /// Value of the vector's components per unit of the unknowns.
-    pub scale: f64,
+    scale: f64,
 }
 
 impl Span {
@@ -201,7 +209,7 @@ impl Span {
     ///
     /// The length belongs to a motion that is allowed, so it is no more than the greatest one. In random
     /// contacts it is nine tenths of the greatest one at least (tests).
-    pub fn farthest(&self, corner: &mut Corner<'_>) -> Option<f64> {
+    fn farthest(&self, corner: &mut Corner<'_>) -> Option<f64> {
         let mut best = Vec3::ZERO;
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             for towards in [axis, -axis] {
@@ -249,7 +257,7 @@ impl<'a> Corner<'a> {
     ///
     /// The result is the length for a motion that is allowed, and no other motion along it goes farther. A
     /// longer one may exist in another direction.
-    pub fn longest(&mut self, span: &Span, start: Vec3) -> Option<f64> {
+    fn longest(&mut self, span: &Span, start: Vec3) -> Option<f64> {
         /// Steps after which the length hardly grows.
         const MOST_STEPS: usize = 12;
         /// Growth of the length, as a share, below which steps end.

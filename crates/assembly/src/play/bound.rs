@@ -4,7 +4,6 @@
 //! of its barrier, hence the motions that the linear program over all bearings allows. If these are within
 //! the assumption, no path from rest leaves it (docs/notes/certificate.md). Otherwise the assumption is
 //! widened slightly beyond the result, and tried again.
-//! widened to what was found and a little more, and tried again.
 //!
 //! Only a few bearings end a motion, and only their regions matter. So each round begins with the pieces' own
 //! rotations and displacements. It continues with the cells of the bearings that end these, until no more are
@@ -20,7 +19,7 @@ use shellock_geom::Vec3;
 
 use super::bearing::{Bearing, Surfaces};
 use super::quantity::{Quantities, Quantity, other_lines};
-use crate::motion::{Corner, Freedom, Limits, Span, System};
+use crate::motion::{Corner, Freedom, Limits, System, farthest_of_piece};
 use crate::verify::contact::Contact;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -456,15 +455,8 @@ impl<'a> Round<'a> {
         let late = |row: usize| self.bound_mm(row);
         let limits = Limits::late(&self.system, &least, &late);
         let mut corner = Corner::new(&limits);
-        let mut most = |from: usize, scale: f64| {
-            let span = Span {
-                n: self.system.n,
-                from,
-                scale,
-            };
-            span.farthest(&mut corner)
-        };
-        Some([most(0, 1.0)?, most(3, 1.0 / LENGTH_MM)?])
+        let [shift_mm, turn] = farthest_of_piece(&mut corner, LENGTH_MM);
+        Some([shift_mm?, turn?])
     }
 
     /// Greatest values in these motions of the quantities that no bearing needed.

@@ -10,7 +10,7 @@ pub(super) struct Failure {
     pub blockers: Vec<Blocker>,
     /// Pieces whose division may help, most promising first.
     pub suspects: Vec<PatchId>,
-    /// Pieces whose seams are too short for connectors.
+    /// Pieces that no seam long enough for connectors joins to most others, or only through one piece.
     pub apart: Vec<PatchId>,
     /// Pieces that came out loose in the last kit.
     pub loose: Vec<PatchId>,
