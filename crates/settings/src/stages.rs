@@ -118,6 +118,11 @@ impl Settings {
         }
     }
 
+    /// The key, if it is cut out of a piece; `None` if it is a piece as it is.
+    pub fn cut_key(&self) -> Option<PatchId> {
+        self.plan.key.filter(|_| self.plan.key_slide.is_some())
+    }
+
     /// Returns the least gaps that finished pieces must keep: those of connectors or of walls, whichever are
     /// narrower.
     pub fn relief(&self) -> Relief {

@@ -12,7 +12,6 @@
 //! ```
 
 mod cone;
-mod mirror;
 mod seams;
 #[cfg(test)]
 mod tests;
@@ -155,7 +154,7 @@ pub fn figures(params: &FigureParams, surface: &SegmentedSurface) -> DivisionFig
     let bvh = TriangleBvh::new(&surface.mesh);
     let pieces = pieces(surface, &topology);
     let areas: Vec<f64> = pieces.iter().map(|p| p.area_mm2).collect();
-    let mirrored = |plane: &Plane| mirror::mirrored_share(plane, surface, &bvh);
+    let mirrored = |plane: &Plane| super::mirror::mirrored_share(plane, surface, &bvh);
     DivisionFigures {
         n_pieces: surface.n_patches,
         area_mm2: Spread::of(areas),

@@ -3,8 +3,10 @@
 use shellock_geom::{Solid, Topology};
 use shellock_report::{Ctx, PatchId};
 use shellock_surface::SegmentedSurface;
+use shellock_surface::seam::graph::Adjacency;
 
 use super::ground::Ground;
+use super::mirror::Twins;
 use super::refine::refine_on;
 use super::smooth::smooth_and_cut;
 use super::split::split_between_regions;
@@ -16,16 +18,18 @@ const MOST_JOINED: usize = 2;
 /// Changes pieces after a failure; `None` if nothing can be changed.
 ///
 /// Dividing one of the `suspects`, most promising first, keeps the user's labels, so it comes first. Pieces
-/// that came `loose` where seams are short would only get shorter seams: they are joined to a neighbour.
+/// that came `loose` where seams are short would only get shorter seams: they are joined to a neighbour, as
+/// are their `twins`.
 pub fn revise(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     suspects: &[PatchId],
     loose: &[PatchId],
+    twins: &Twins,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     if !loose.is_empty() && has_short_contacts(params, surface) {
-        let joined = join(ctx, params, surface, loose)?;
+        let joined = join(ctx, params, surface, loose, twins)?;
         if joined.is_some() {
             return Ok(joined);
         }
@@ -33,27 +37,36 @@ pub fn revise(
     first(suspects, |piece| divide(ctx, params, surface, piece))
 }
 
-/// Joins the first two of `pieces` to neighbours; `None` if that leaves nothing to lock.
+/// Joins the first two of `pieces` to neighbours, and their `twins` likewise. If that leaves nothing to lock,
+/// the twins stay; `None` if nothing is left to lock even so.
 pub fn join(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     pieces: &[PatchId],
+    twins: &Twins,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    match &pieces[..pieces.len().min(MOST_JOINED)] {
-        [] => Ok(None),
-        first => unite(ctx, params, surface, first),
+    let first = &pieces[..pieces.len().min(MOST_JOINED)];
+    if first.is_empty() {
+        return Ok(None);
+    }
+    let alike = unite(ctx, params, surface, first, twins)?;
+    let has_twins = first.iter().any(|piece| twins.of(*piece).is_some());
+    match alike {
+        None if has_twins => unite(ctx, params, surface, first, &Twins::default()),
+        alike => Ok(alike),
     }
 }
 
-/// Joins the first of `pieces` that can be joined to a neighbour.
+/// Joins the first of `pieces` that can be joined to a neighbour, and its twin likewise.
 pub fn join_first(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     pieces: &[PatchId],
+    twins: &Twins,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    first(pieces, |piece| unite(ctx, params, surface, &[piece]))
+    first(pieces, |piece| join(ctx, params, surface, &[piece], twins))
 }
 
 /// Makes the first change of a piece that is possible.
@@ -99,8 +112,9 @@ pub fn refined_again(
     try_change(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
-/// Joins each of `patches` to the neighbour with the longest common seam, then refines and smooths again.
-/// `None` if too few pieces would be left to lock, or if nothing is joined.
+/// Joins each of `patches` to the neighbour with the longest common seam, and their `twins` to that
+/// neighbour's twin, then refines and smooths again. `None` if too few pieces would be left to lock, or if
+/// nothing is joined.
 ///
 /// The feedback loop uses this if dividing did not help. Patches may be renumbered.
 pub fn unite(
@@ -108,39 +122,61 @@ pub fn unite(
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     patches: &[PatchId],
+    twins: &Twins,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     let graph = surface.contact_graph(0.0);
-    let mut number: Vec<u32> = (0..surface.n_patches as u32).collect();
+    let touching = |patch: PatchId| {
+        let contacts = graph.contacts().iter();
+        contacts.filter(move |c| c.a == patch || c.b == patch)
+    };
+    let other = |patch: PatchId, c: &Adjacency| if c.a == patch { c.b } else { c.a };
+    let mut pairs: Vec<[PatchId; 2]> = Vec::new();
     for &patch in patches {
-        let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
-        let Some(longest) = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm)) else {
+        let longest = touching(patch).max_by(|c, d| c.total_mm.total_cmp(&d.total_mm));
+        let Some(into) = longest.map(|c| other(patch, c)) else {
             return Ok(None);
         };
-        let into = number[usize::from(if longest.a == patch { longest.b } else { longest.a })];
-        let own = number[usize::from(patch)];
-        number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
+        pairs.push([patch, into]);
+        let beyond = [patch, into].map(|p| twins.of(p));
+        if let [Some(twin), into_twin] = beyond
+            && !patches.contains(&twin)
+        {
+            let into = into_twin.unwrap_or(into);
+            if touching(twin).any(|c| other(twin, c) == into) {
+                pairs.push([twin, into]);
+            }
+        }
     }
-    try_change(ctx, params, surface, |solid, labels| {
-        let label: Vec<u32> = labels.as_slice().iter().map(|&k| number[k as usize]).collect();
-        let joined = FaceLabels::from_components(&Topology::new(solid), &label);
-        accept_join(joined, surface)
-    })
+    unite_pairs(ctx, params, surface, &pairs)
 }
 
-/// Joins two pieces that touch, then refines and smooths again. `None` if too few pieces would be left to
-/// lock.
+/// Joins two pieces that touch, and their `twins`, then refines and smooths again. `None` if too few pieces
+/// would be left to lock.
 pub fn unite_two(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     [a, b]: [PatchId; 2],
+    twins: &Twins,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
+    let beyond = [a, b].map(|p| twins.of(p).unwrap_or(p));
+    unite_pairs(ctx, params, surface, &[[a, b], beyond])
+}
+
+/// Gives the pieces of each pair one label. Parts that do not touch become pieces of their own again.
+fn unite_pairs(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    pairs: &[[PatchId; 2]],
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
+    let mut number: Vec<u32> = (0..surface.n_patches as u32).collect();
+    for pair in pairs {
+        let [own, into] = pair.map(|p| number[usize::from(p)]);
+        number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
+    }
     try_change(ctx, params, surface, |solid, labels| {
-        let label: Vec<u32> = labels
-            .as_slice()
-            .iter()
-            .map(|&k| if k == b.0 { a.0 } else { k })
-            .collect();
+        let label: Vec<u32> = labels.as_slice().iter().map(|&k| number[k as usize]).collect();
         let joined = FaceLabels::from_components(&Topology::new(solid), &label);
         accept_join(joined, surface)
     })

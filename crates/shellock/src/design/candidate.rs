@@ -2,15 +2,15 @@
 
 use std::borrow::Cow;
 
-use shellock_divide::widen;
-use shellock_geom::Solid;
-
 use super::division::Division;
 use super::job::Job;
 use super::{DesignError, KeySource, Settings};
 use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
 use crate::piece::Grip;
+use crate::segmentation::Plane;
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, sizes};
+use shellock_divide::widen;
+use shellock_geom::Solid;
 
 /// A key that is cut.
 pub(super) struct CutKey {
@@ -84,6 +84,7 @@ impl<'a> Candidate<'a> {
                 surface,
                 settings,
                 grip: None,
+                mirror: self.mirror(job),
                 changes: Vec::new(),
             }));
         };
@@ -100,8 +101,17 @@ impl<'a> Candidate<'a> {
             settings,
             sizes,
             grip: job.input.params.has_grip.then(|| key.grip(patch)),
+            mirror: self.mirror(job),
             changes: Vec::new(),
         }))
+    }
+
+    /// Plane of symmetry of the turned model.
+    fn mirror(&self, job: &Job<'_>) -> Option<Plane> {
+        job.mirror.map(|Plane { at, normal }| Plane {
+            at: self.turn.apply(at),
+            normal: self.turn.apply(normal),
+        })
     }
 
     /// Returns the job's settings, with the regions to keep whole in the turned model.

@@ -3,8 +3,9 @@
 use super::failure::Failure;
 use super::{DesignError, Settings};
 use crate::piece::Grip;
+use crate::segmentation::{Plane, Twins};
 use crate::sizes::ChosenSizes;
-use crate::{Ctx, SegmentedSurface, Warning, segmentation};
+use crate::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
 
 /// Pieces, and the stages' settings for them.
 pub(super) struct Division {
@@ -13,11 +14,19 @@ pub(super) struct Division {
     pub sizes: ChosenSizes,
     /// Notch of the key.
     pub grip: Option<Grip>,
+    /// Plane about which both sides are divided alike.
+    pub mirror: Option<Plane>,
     /// Warnings of pieces that were joined for the sake of use.
     pub changes: Vec<Warning>,
 }
 
 impl Division {
+    /// Pieces that change together, since both sides are divided alike.
+    pub fn twins(&self) -> Twins {
+        let of = |plane: &Plane| Twins::new(plane, &self.surface);
+        self.mirror.as_ref().map_or_else(Twins::default, of)
+    }
+
     /// Warns of connectors and pieces that are not as the user wished.
     pub fn warn(&self, ctx: &Ctx<'_>) {
         self.sizes.tell(ctx);
@@ -38,8 +47,31 @@ pub(super) fn revise(
     let (params, surface) = (&division.settings.segmentation, &division.surface);
     let ctx = &ctx.fork();
     Ok(if is_hopeless {
-        segmentation::join_first(ctx, params, surface, &failure.suspects)?
+        segmentation::join_first(ctx, params, surface, &failure.suspects, &division.twins())?
     } else {
-        segmentation::revise(ctx, params, surface, &failure.suspects, &failure.loose)?
+        segmentation::revise(
+            ctx,
+            params,
+            surface,
+            &failure.suspects,
+            &failure.loose,
+            &division.twins(),
+        )?
     })
+}
+
+/// Joins pieces to neighbours; `None` if that leaves nothing to lock.
+pub(super) fn join(
+    ctx: &Ctx,
+    division: &Division,
+    pieces: &[PatchId],
+) -> Result<Option<SegmentedSurface>, DesignError> {
+    let (params, surface) = (&division.settings.segmentation, &division.surface);
+    Ok(segmentation::join(
+        ctx,
+        params,
+        surface,
+        pieces,
+        &division.twins(),
+    )?)
 }

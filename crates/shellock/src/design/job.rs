@@ -6,6 +6,7 @@ use super::wall::Wall;
 use super::ways::Input;
 use super::{DesignError, KeySource, Settings};
 use crate::key::FaceSet;
+use crate::segmentation::Plane;
 use crate::strength::StressMap;
 use crate::{Ctx, PatchId, SegmentedSurface, segmentation};
 
@@ -15,6 +16,8 @@ pub(super) struct Job<'a> {
     pub wall: Arc<Wall>,
     pub surface: SegmentedSurface,
     stress: Option<StressMap>,
+    /// Plane about which both sides are divided alike; `None` if they are divided as they are.
+    pub mirror: Option<Plane>,
     /// Triangles of the model that the user wants in the key; `None` if the key is ours to choose.
     key_faces: Option<FaceSet>,
 }
@@ -36,7 +39,13 @@ impl<'a> Job<'a> {
             wall,
             surface,
             stress,
+            mirror: None,
         })
+    }
+
+    /// The job with both sides divided alike about a plane.
+    pub fn with_mirror(self, mirror: Option<Plane>) -> Self {
+        Self { mirror, ..self }
     }
 
     /// The patch with the largest share of what the user wants in the key.

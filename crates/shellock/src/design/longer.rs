@@ -4,6 +4,7 @@ use super::DesignError;
 use super::agenda::{Allowance, Step};
 use super::division::Division;
 use super::trial::Change;
+use crate::motion::RelativePlay;
 use crate::segmentation::{Wish, lengthen};
 use crate::{Ctx, PatchId};
 
@@ -13,17 +14,17 @@ const AIM: f64 = 0.85;
 /// Growth wanted of seams that are too short for connectors.
 const FOR_CONNECTORS: f64 = 2.0;
 
-/// Offers longer seams for pieces that rattle, with the ratios of their play to what is allowed.
+/// Offers longer seams for pieces that rattle.
 pub(super) fn for_play(
     ctx: &Ctx,
     division: &Division,
-    rattling: &[(PatchId, f64)],
+    rattling: &[RelativePlay],
     allowance: &Allowance,
 ) -> Result<Option<Change>, DesignError> {
     // Play falls about as seams grow.
-    let wish = |&(piece, excess): &(PatchId, f64)| Wish {
-        piece,
-        growth: excess / AIM,
+    let wish = |play: &RelativePlay| Wish {
+        piece: play.piece,
+        growth: play.excess / AIM,
     };
     offer(ctx, division, rattling.iter().map(wish).collect(), allowance)
 }
@@ -71,10 +72,18 @@ fn offer(
 ) -> Result<Option<Change>, DesignError> {
     let settings = &division.settings;
     // A key that is cut stays where it is.
-    let key = settings.plan.key.filter(|_| settings.plan.key_slide.is_some());
+    let key = settings.cut_key();
     wishes.retain(|wish| Some(wish.piece) != key);
     if wishes.is_empty() || !allowance.is_allowed(Step::Lengthen) {
         return Ok(None);
+    }
+    // Both sides change alike.
+    let twins = division.twins();
+    for wish in wishes.clone() {
+        let twin = twins.of(wish.piece).filter(|twin| Some(*twin) != key);
+        if let Some(piece) = twin.filter(|twin| wishes.iter().all(|other| other.piece != *twin)) {
+            wishes.push(Wish { piece, ..wish });
+        }
     }
     let longer = lengthen(
         &ctx.fork(),

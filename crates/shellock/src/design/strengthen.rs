@@ -132,7 +132,13 @@ fn join(
         return Ok(None);
     };
     let params = &division.settings.segmentation;
-    let united = segmentation::unite_two(&ctx.fork(), params, &division.surface, first.between)?;
+    let united = segmentation::unite_two(
+        &ctx.fork(),
+        params,
+        &division.surface,
+        first.between,
+        &division.twins(),
+    )?;
     let warning = Warning::new(
         Cause::JoinedForUse {
             load: weakest.deed.words().to_owned(),

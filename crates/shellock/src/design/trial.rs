@@ -19,6 +19,7 @@ use crate::key::KeySite;
 use crate::metric::EvenSurface;
 use crate::plan::lesson::Lesson;
 use crate::plan::{self, LatticePlan, PlanConstraints, PlanSurvey};
+use crate::segmentation::Plane;
 use crate::sizes::ChosenSizes;
 use crate::{Ctx, SegmentedSurface, Warning, segmentation};
 
@@ -89,6 +90,8 @@ pub(super) struct Trial<'a> {
     /// The thinnest wall that is made, once a way needs it.
     thin: Option<Wall>,
     job: Option<Job<'a>>,
+    /// Plane of symmetry of the model, once it was sought.
+    mirror: Option<Option<Plane>>,
     /// The first division, if it is known.
     division: Option<SegmentedSurface>,
     /// Sites for a key that is cut, best first.
@@ -104,6 +107,7 @@ impl<'a> Trial<'a> {
             input,
             thinnest,
             thin: None,
+            mirror: None,
             job: None,
             division: None,
             sites: Vec::new(),
@@ -210,9 +214,20 @@ impl<'a> Trial<'a> {
         job: Job<'a>,
     ) -> Result<Option<Failure>, DesignError> {
         self.sites = candidate::sites(ctx, &job)?;
-        self.job = Some(job);
+        let mirror = self.mirror_of(&job);
+        self.job = Some(job.with_mirror(mirror));
         agenda.set_keys(self.sites.len().min(CUT_KEYS) + 1);
         self.use_key(ctx, agenda)
+    }
+
+    /// Plane about which both sides are divided alike. Labels that are given stay as they are.
+    fn mirror_of(&mut self, job: &Job<'_>) -> Option<Plane> {
+        let (params, input) = (&job.settings().segmentation, &self.input);
+        if !params.symmetric || !params.method.knows_symmetry() || input.labels.is_some() {
+            return None;
+        }
+        let sought = || segmentation::symmetry_plane(params, input.model);
+        *self.mirror.get_or_insert_with(sought)
     }
 
     /// Takes the present place for the key, and the pieces as they are divided.
