@@ -6,11 +6,13 @@
 //! `A x ≤ g` lets pieces go: a few gaps, or without end.
 
 mod forces;
+mod hold;
 mod play;
 pub(crate) mod proof;
 mod system;
 
 use forces::Balance;
+pub use hold::least_holds;
 use nalgebra::DVector;
 pub(crate) use play::{Corner, Limits, farthest_of_piece};
 use rand::RngExt;
@@ -51,6 +53,15 @@ pub const LOOSE: f64 = 2.0;
 /// Multiple of [`most_play`] up to which a rattle is only reported. No other kit is made for it, since that
 /// costs as much time as the first: three kits of a hand took 98 s of processor time, one takes 29.
 pub const SLIGHT: f64 = 1.2;
+
+/// Play of a piece, compared to the allowed play.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativePlay {
+    /// Piece whose play it is.
+    pub piece: PatchId,
+    /// Ratio of its play to the allowed play.
+    pub excess: f64,
+}
 
 /// Play above which a piece counts as rattling, mm and degrees.
 ///

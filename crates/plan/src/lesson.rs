@@ -47,6 +47,13 @@ pub enum Lesson {
         /// Deepest point of the hole, mm.
         at: Vec3,
     },
+    /// Connectors hold a piece by much less than the plan foresaw.
+    BadlyHeld {
+        /// Id of the piece's patch.
+        piece: PatchId,
+        /// Share of the foreseen hold, in [0, 1).
+        share: f64,
+    },
     /// The plan as a whole failed, whatever the reason.
     FailedPlan {
         /// Plan to reject, in patches of the division.
@@ -97,6 +104,10 @@ impl Lesson {
             } => {
                 constraints.forbidden.insert((*piece, *separation));
             }
+            Self::BadlyHeld { piece, share } => {
+                let least = constraints.held_shares.entry(*piece).or_insert(*share);
+                *least = least.min(*share);
+            }
             Self::FailedPlan { plan, .. } => constraints.rejections.push(plan.clone()),
         }
     }
@@ -104,7 +115,7 @@ impl Lesson {
     /// Pieces whose division into smaller ones may help.
     pub fn suspects(&self) -> Vec<PatchId> {
         match self {
-            Self::WeakJoints(_) => Vec::new(),
+            Self::WeakJoints(_) | Self::BadlyHeld { .. } => Vec::new(),
             Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } | Self::SkinLost { piece, .. } => {
                 vec![*piece]
             }
@@ -169,6 +180,13 @@ impl std::fmt::Display for Lesson {
                 write!(
                     f,
                     "piece {piece} would lose outer surface on its way out, at {at:.0} mm"
+                )
+            }
+            Self::BadlyHeld { piece, share } => {
+                let percent = 100.0 * share;
+                write!(
+                    f,
+                    "connectors hold piece {piece} by {percent:.0} % of what was foreseen"
                 )
             }
             Self::FailedPlan { loose, .. } if loose.is_empty() => {

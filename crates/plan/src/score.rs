@@ -26,7 +26,7 @@ const INWARD_COST: f64 = 0.25;
 const OCCLUDED_COST: f64 = 0.3;
 
 /// Hold that the verification requires, mm³.
-pub(super) const ASKED_MM3: f64 = 0.5;
+pub const ASKED_MM3: f64 = 0.5;
 
 /// Estimated hold from which a piece counts as held, mm³: three times what the verification requires.
 pub(super) const HELD_MM3: f64 = 3.0 * ASKED_MM3;

@@ -18,7 +18,7 @@ pub type LatticePlan = InstallationPlan<LatticeDirection>;
 pub type LatticeStep = InstallationStep<LatticeDirection>;
 
 /// Lessons of earlier rounds, all of which the search must respect.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanConstraints {
     /// (later piece, earlier piece, separation direction of the later one) whose connectors came out too
     /// small to hold. Such a pair touches but joins nothing. Along other directions it may join.
@@ -30,6 +30,8 @@ pub struct PlanConstraints {
     pub rubs: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason not covered by the fields above.
     pub rejections: Vec<LatticePlan>,
+    /// Share of the foreseen hold of a piece that connectors had in a plan that was given up, in [0, 1).
+    pub held_shares: BTreeMap<PatchId, f64>,
 }
 
 impl PlanConstraints {
@@ -40,6 +42,8 @@ impl PlanConstraints {
             forbidden,
             rubs: rubbed,
             rejections,
+            // Restricts no plan of the search, only the choice among them.
+            held_shares: _,
         } = self;
         let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
         weak_joints.len() + forbidden.len() + n_orders + rejections.len()

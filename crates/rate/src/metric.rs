@@ -27,7 +27,7 @@ pub use climb::{ClimbError, ClimbParams, ClimbRules, Climbed, climb};
 pub use data_driven::{data_driven, pieces_alone};
 pub use deform::{Deformed, DeformedLoad, Told, Touch};
 pub use foreseen::{Foreseen, foreseen};
-pub use foresight::{ExpectedPlay, Foresight};
+pub use foresight::{Expected, Foresight};
 pub use model::{EvenSurface, MetricParams, PlanModel};
 pub use question::Choice;
 pub use rating::{Bench, RESERVE, Rated};

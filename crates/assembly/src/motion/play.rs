@@ -204,23 +204,21 @@ impl Span {
         form
     }
 
-    /// Greatest length of the vector within the limits of `corner`, sought from the coordinate axes, both
-    /// ways; `None` if it is unlimited.
+    /// Greatest length of the vector within the limits of `corner`, sought from the ends of the coordinate
+    /// axes; `None` if it is unlimited.
     ///
     /// The length belongs to a motion that is allowed, so it is no more than the greatest one. In random
     /// contacts it is nine tenths of the greatest one at least (tests).
     fn farthest(&self, corner: &mut Corner<'_>) -> Option<f64> {
-        let mut best = Vec3::ZERO;
+        let mut longest: f64 = 0.0;
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             for towards in [axis, -axis] {
                 corner.farthest(&self.along(towards))?;
-                let reached = self.of(corner.motion());
-                if reached.length_squared() > best.length_squared() {
-                    best = reached;
-                }
+                let end = self.of(corner.motion());
+                longest = longest.max(corner.longest(self, end)?);
             }
         }
-        corner.longest(self, best)
+        Some(longest)
     }
 }
 

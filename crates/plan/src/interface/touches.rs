@@ -19,6 +19,10 @@ use crate::{LatticePlan, PlanParams};
 const STEP: usize = 3;
 /// Depths at which walls touch, as shares of their thickness.
 const DEPTHS: [f64; 2] = [0.1, 0.9];
+/// Shares of a wall's height and of a pin's length that count as a hold: walls are rounded, and carving
+/// removes 10 to 30 % of the joints and shortens their ends.
+const WALL_SHARE: f64 = 0.6;
+const PIN_SHARE: f64 = 0.6;
 
 /// Contacts of the walls of all pieces, with the gaps of walls.
 pub fn wall_contacts(params: &PlanParams, interfaces: &[Interface], plan: &LatticePlan) -> Vec<Contact> {
@@ -31,6 +35,7 @@ pub fn wall_contacts(params: &PlanParams, interfaces: &[Interface], plan: &Latti
 fn walls(params: &PlanParams, interface: &Interface, plan: &LatticePlan) -> Vec<Contact> {
     let (side, [later, earlier]) = order(interface, plan);
     let s = plan.separation(later).unit();
+    let height_mm = WALL_SHARE * params.wall_mm / DEPTHS.len() as f64;
     let at = |x: &Sample, depth: f64| Contact {
         a: later,
         b: earlier,
@@ -40,7 +45,7 @@ fn walls(params: &PlanParams, interface: &Interface, plan: &LatticePlan) -> Vec<
             true => params.key_gap_mm,
             false => params.wall_gap_mm,
         },
-        area_mm2: 0.0,
+        area_mm2: height_mm * STEP as f64 * x.length_mm,
     };
     let samples = interface
         .lines
@@ -77,34 +82,46 @@ fn pins(params: &PlanParams, interface: &Interface, plan: &LatticePlan, leaves: 
         true => params.key_gap_mm.max(params.clearance_mm),
         false => params.clearance_mm,
     };
-    let contact = |(of_later, point, normal): (bool, Vec3, Vec3)| Contact {
-        a: if of_later { later } else { earlier },
-        b: if of_later { earlier } else { later },
-        point,
-        normal,
+    let contact = |face: Face, length_mm: f64| Contact {
+        a: if face.is_of_later { later } else { earlier },
+        b: if face.is_of_later { earlier } else { later },
+        point: face.point,
+        normal: face.normal,
         gap_mm,
-        area_mm2: 0.0,
+        area_mm2: face.width_mm * length_mm,
     };
     let mut found = Vec::new();
     for line in &interface.lines {
         let runs = line.runs_where(way, &is_clear);
         for run in runs.into_iter().filter(|run| run.is_made(interface.size_mm)) {
             let last = run.samples.len() - 1;
-            let places = (0..=last).filter(|i| i % STEP == 0 || *i == last);
-            let samples = places.map(|i| &line.samples[run.samples[i]]);
+            let places: Vec<usize> = (0..=last).filter(|i| i % STEP == 0 || *i == last).collect();
+            let length_mm = PIN_SHARE * run.length_mm / places.len() as f64;
+            let samples = places.iter().map(|i| &line.samples[run.samples[*i]]);
             let faces = samples.flat_map(|x| faces(run.kind, interface.size_mm, x, s, side));
-            found.extend(faces.map(contact));
+            found.extend(faces.map(|face| contact(face, length_mm)));
             for (i, outwards) in line.stops(&run, way, interface.size_mm, gap_mm) {
-                found.extend(
-                    end_faces(run.kind, interface.size_mm, &line.samples[i], s, side, outwards).map(contact),
-                );
+                let ends = end_faces(run.kind, interface.size_mm, &line.samples[i], s, side, outwards);
+                // Carving decides where stops stand, so they do not count as a hold.
+                found.extend(ends.map(|face| contact(face, 0.0)));
             }
         }
     }
     found
 }
 
-/// Faces of the end of a pin that a stop holds, which looks `outwards`; as [`faces`] gives them.
+/// A face of a connector's male half.
+#[derive(Clone, Copy)]
+struct Face {
+    is_of_later: bool,
+    point: Vec3,
+    /// Unit vector that the face looks along.
+    normal: Vec3,
+    /// Width of the face across the seam that the point represents, mm.
+    width_mm: f64,
+}
+
+/// Faces of the end of a pin that a stop holds, which looks `outwards`.
 fn end_faces(
     kind: Kind,
     size_mm: f64,
@@ -112,17 +129,26 @@ fn end_faces(
     s: LatticeDirection,
     side: f64,
     outwards: Vec3,
-) -> impl Iterator<Item = (bool, Vec3, Vec3)> {
+) -> impl Iterator<Item = Face> {
     let sides = faces(kind, size_mm, x, s, side);
     // The faces beside the pin come in pairs, at its tip and at its root.
-    let between = move |i: usize, j: usize| (sides[i].0, sides[i].1.midpoint(sides[j].1), outwards);
+    let between = move |i: usize, j: usize| Face {
+        point: sides[i].point.midpoint(sides[j].point),
+        normal: outwards,
+        ..sides[i]
+    };
     [between(1, 3), between(2, 4)].into_iter()
 }
 
-/// Faces of the male half at a sample: true if it is the later piece's, a point, and the direction that the
-/// face looks.
-fn faces(kind: Kind, size_mm: f64, x: &Sample, s: LatticeDirection, side: f64) -> Vec<(bool, Vec3, Vec3)> {
+/// Faces of the male half at a sample.
+fn faces(kind: Kind, size_mm: f64, x: &Sample, s: LatticeDirection, side: f64) -> Vec<Face> {
     let across = side * x.across;
+    let face = |is_of_later: bool, point: Vec3, normal: Vec3, width: f64| Face {
+        is_of_later,
+        point,
+        normal,
+        width_mm: width * size_mm,
+    };
     match kind {
         Kind::Pin { later_is_male } => {
             let sign = if later_is_male { 1.0 } else { -1.0 };
@@ -133,21 +159,24 @@ fn faces(kind: Kind, size_mm: f64, x: &Sample, s: LatticeDirection, side: f64) -
             let to_female = sign * across;
             let n = to_female.reject_from_normalized(leaves).normalize_or(x.normal);
             let at = |beside: f64, below: f64| x.point - size_mm * (beside * n + below * leaves);
+            let beside = |beside: f64, below: f64, normal: Vec3| {
+                face(later_is_male, at(beside, below), normal, 0.5 * PIN_DEPTH)
+            };
             vec![
-                (later_is_male, at(0.5 * PIN_WIDTH, PIN_DEPTH), -leaves),
-                (later_is_male, at(PIN_WIDTH, PIN_DEPTH), -n),
-                (later_is_male, at(PIN_WIDTH, 0.1 * PIN_DEPTH), -n),
-                (later_is_male, at(0.0, PIN_DEPTH), n),
-                (later_is_male, at(0.0, 0.1 * PIN_DEPTH), n),
+                face(later_is_male, at(0.5 * PIN_WIDTH, PIN_DEPTH), -leaves, PIN_WIDTH),
+                beside(PIN_WIDTH, PIN_DEPTH, -n),
+                beside(PIN_WIDTH, 0.1 * PIN_DEPTH, -n),
+                beside(0.0, PIN_DEPTH, n),
+                beside(0.0, 0.1 * PIN_DEPTH, n),
             ]
         }
         // The earlier piece carries the tongue, which reaches under the later one's wall.
         Kind::Rail => {
             let at = |below: f64| x.point - size_mm * (0.25 * across + below * x.normal);
             vec![
-                (false, at(0.0), x.normal),
-                (false, at(0.45), -x.normal),
-                (false, at(0.2) - 0.25 * size_mm * across, -across),
+                face(false, at(0.0), x.normal, 0.5),
+                face(false, at(0.45), -x.normal, 0.5),
+                face(false, at(0.2) - 0.25 * size_mm * across, -across, 0.45),
             ]
         }
     }
@@ -250,5 +279,36 @@ mod tests {
         // Room for one stop.
         assert_eq!(along(11.5), 2);
         assert_eq!(along(8.0), 0);
+    }
+
+    #[test]
+    fn sides_of_a_pin_hold_along_the_share_of_the_run_that_counts() {
+        let (up, size_mm) = (LatticeDirection::nearest(Vec3::Z), 2.5);
+        let params = PlanParams::default();
+        let seam = level_seam(vec![Vec3::ZERO, 40.0 * Vec3::X]);
+        let lines = lines(&params, size_mm, &seam, None);
+        let interface = contact(&params, &ConnectorSizes::uniform(size_mm), &[(&seam, lines)]).unwrap();
+        let run_mm = interface.joint(PatchId(1), up).run_mm;
+        let steps = [0, 1].map(|piece: u32| LatticeStep {
+            piece: PatchId(piece),
+            separation: up,
+        });
+        let plan = LatticePlan {
+            steps: steps.to_vec(),
+        };
+        let pins = pin_contacts(&params, &[interface], &plan);
+        let area_mm2 = |way: Vec3| -> f64 {
+            let facing = pins.iter().filter(|c| c.normal.dot(way) > 0.99);
+            facing.map(|c| c.area_mm2).sum()
+        };
+        let side_mm2 = PIN_SHARE * run_mm * PIN_DEPTH * size_mm;
+        for way in [Vec3::Y, Vec3::NEG_Y] {
+            assert!(
+                (area_mm2(way) / side_mm2 - 1.0).abs() < 1e-6,
+                "{} {side_mm2}",
+                area_mm2(way)
+            );
+        }
+        assert_eq!(area_mm2(Vec3::X), 0.0, "stops hold nothing");
     }
 }

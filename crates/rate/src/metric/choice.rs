@@ -258,6 +258,7 @@ fn hold(foresight: &Foresight, bench: &Bench<'_>, climbed: &Climbed<'_>) -> Resu
     let Foreseen {
         play: foreseen_play,
         excess: foreseen_excess,
+        ..
     } = foresight.play(plan);
     Ok(Holding {
         n_compared: climbed.n_plans,

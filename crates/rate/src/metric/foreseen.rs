@@ -14,7 +14,7 @@
 //! The key may slide on its way out as far as proofs assume. Limits: its ribs are not known; they can only
 //! make its play less.
 
-use shellock_assembly::motion::{Contact, farthest, most_play};
+use shellock_assembly::motion::{Contact, farthest, least_holds, most_play};
 use shellock_assembly::play::SLIDE_MM;
 use shellock_geom::{Aabb, Vec3};
 use shellock_plan::LatticePlan;
@@ -29,6 +29,8 @@ pub struct Foreseen {
     pub play: Vec<[f64; 2]>,
     /// Ratio of each piece's play to the allowed play, in the same order.
     pub excess: Vec<f64>,
+    /// Estimated overlap with which each piece resists its weakest push, mm³, in the same order.
+    pub holds_mm3: Vec<f64>,
 }
 
 /// Predicts the play of pieces that touch at `contacts`, and compares it to the limits. `size_mm` is the
@@ -50,7 +52,12 @@ pub fn foreseen(
         (play[0] / most_mm).max(play[1] / most_deg)
     };
     let excess = play.iter().zip(&bounds).map(excess).collect();
-    Foreseen { play, excess }
+    let holds_mm3 = least_holds(contacts, model.assembly.n_parts, clearance_mm);
+    Foreseen {
+        play,
+        excess,
+        holds_mm3,
+    }
 }
 
 /// Displacement, mm, and turn, degrees, of each piece.

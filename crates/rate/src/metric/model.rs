@@ -531,3 +531,36 @@ fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
     };
     normals.into_iter().zip(around).map(turned).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A leaf without thickness stays folded at all its points, so every round shrinks it.
+    #[test]
+    fn relaxing_a_limb_that_stays_folded_leaves_triangles_that_can_be_computed_with() {
+        const ROWS: u32 = 20;
+        let at = |row: u32| [-1.0, 1.0].map(|x| Vec3::new(x, 0.0, f64::from(row)));
+        let front = |row: u32| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| 2 * row + k);
+            [[a, b, d], [a, d, c]]
+        };
+        let front: Vec<[u32; 3]> = (0..ROWS).flat_map(front).collect();
+        let back = front.iter().map(|&[a, b, c]| [a, c, b]);
+        let leaf = TriMesh {
+            points: (0..=ROWS).flat_map(at).collect(),
+            triangles: front.iter().copied().chain(back).collect(),
+        };
+        let relaxed = relax_folds(leaf.clone());
+        assert!(relaxed.points != leaf.points, "the leaf is folded");
+        let least_mm2 = |mesh: &TriMesh| {
+            let areas = (0..mesh.triangles.len()).map(|f| mesh.face_area(f));
+            areas.fold(f64::INFINITY, f64::min)
+        };
+        assert!(
+            least_mm2(&relaxed) > 1e-6 * least_mm2(&leaf),
+            "{}",
+            least_mm2(&relaxed)
+        );
+    }
+}

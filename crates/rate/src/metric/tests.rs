@@ -284,20 +284,3 @@ fn a_half_that_nothing_holds_is_told_with_its_place() {
     assert_eq!(loose.pieces, [first]);
     assert_eq!(loose.at.unwrap()[2] > 0.0, first == PatchId(1));
 }
-
-/// A limb thinner than the edges of the even mesh folds there, and no relaxing unfolds it.
-#[test]
-fn a_thread_of_a_limb_leaves_seams_that_can_be_simulated() {
-    let mut mesh = sphere(5, Vec3::splat(30.0));
-    for p in &mut mesh.points {
-        if p.z > 28.5 {
-            let far = (p.z - 28.5) / 1.5;
-            let width = 1.0 - 0.98 * far.min(0.25) / 0.25;
-            *p = Vec3::new(p.x * width, p.y * width, 28.5 + 90.0 * far);
-        }
-    }
-    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-    let surface = label(mesh, 4, octant);
-    let model = PlanModel::new(&MetricParams::default(), &surface, &ConnectorSizes::default());
-    assert!(model.surface_model().is_ok());
-}

@@ -75,8 +75,10 @@ pub(super) struct Allowance {
     /// True if half of the divisions are used up, and no kit was made: a piece that blocks plans is then
     /// joined.
     pub is_hopeless: bool,
-    /// True if a kit may be given up before it is finished: another one is allowed then.
-    may_stop_kit: bool,
+    /// True if kits may be given up before they are finished.
+    may_stop: bool,
+    /// True if another kit is allowed with the present key.
+    has_kits: bool,
     /// Time to keep back for the kit while its plan is improved, s.
     pub kit_reserve_s: f64,
     /// Time without which the kit is not begun, s.
@@ -92,9 +94,11 @@ impl Allowance {
         self.permit(step) == Permit::Yes
     }
 
-    /// Returns true if a kit may be given up before it is finished, for the sake of a step.
+    /// Returns true if a kit may be given up before it is finished, for the sake of a step. Another plan of
+    /// the same pieces counts by itself, not as a kit.
     pub fn may_stop_for(&self, step: Step) -> bool {
-        self.may_stop_kit && self.is_allowed(step)
+        let has_kits = self.has_kits || step == Step::Reconnect;
+        self.may_stop && has_kits && self.is_allowed(step)
     }
 
     /// An allowance of these steps alone.
@@ -346,7 +350,8 @@ impl Agenda {
             least_factor: self.least_factor(),
             may_end_climb: !self.is_wall_thick(),
             is_hopeless: self.n_kits == 0 && 2 * n_divided >= self.limit(Step::Divide),
-            may_stop_kit: self.may_stop && self.n_kits + 1 < self.most_kits(),
+            may_stop: self.may_stop,
+            has_kits: self.n_kits + 1 < self.most_kits(),
             kit_reserve_s: self.clock.kit_reserve_s(),
             least_kit_s: self.clock.least_kit_s(),
         }
@@ -361,7 +366,8 @@ impl Agenda {
         }
         if report.is_stopped {
             self.has_stopped = true;
-            self.n_kits += 1;
+            // Another plan of the same pieces has a limit of its own.
+            self.n_kits += usize::from(!report.offers.contains(&Step::Reconnect));
         }
         if let Some(step) = report.late {
             self.skip(ctx, step);
@@ -555,9 +561,12 @@ impl Agenda {
     fn is_late(&self, ctx: &Ctx, step: Step) -> bool {
         let reserved_s = self.reserved_s();
         match step {
-            Step::Replan | Step::Remake | Step::Divide | Step::JoinRattling | Step::NextKey => {
-                self.clock.is_too_late_for_trial(ctx, reserved_s, 1.0)
-            }
+            Step::Replan
+            | Step::Reconnect
+            | Step::Remake
+            | Step::Divide
+            | Step::JoinRattling
+            | Step::NextKey => self.clock.is_too_late_for_trial(ctx, reserved_s, 1.0),
             Step::Thicken => self.clock.is_too_late_for_wall(ctx, reserved_s),
             Step::NextWay => self
                 .clock

@@ -3,7 +3,7 @@
 use shellock_make::Parts as KitParts;
 
 use super::agenda::{Allowance, Step};
-use super::division::{Division, revise};
+use super::division::{Division, join, revise};
 use super::failure::Failure;
 use super::kit::{Recipe, make};
 use super::longer;
@@ -13,9 +13,9 @@ use super::trial::{Change, Learned, Parts};
 use super::{DesignError, Kit, Planned};
 use crate::body::BodyError;
 use crate::metric::{Chosen, EvenSurface, Foresight, LoadBorne, MetricParams, Stand};
+use crate::motion::RelativePlay;
 use crate::plan::lesson::Lesson;
 use crate::plan::{FoundPlan, Handover, LatticePlan, PlanOutcome, PlanParams};
-use crate::segmentation::join;
 use crate::{Cancelled, Ctx, MakeError, PatchId, key, metric, plan};
 
 /// The part of the proof's work limit that a plan gets before it is chosen: one of so many. A tenth proves
@@ -102,7 +102,9 @@ pub(super) fn make_kit(
             is_stopped: true,
             ..match instead {
                 Instead::Change(change) => Found::nothing(Failure::of("pieces rattle")).with(Some(change)),
-                Instead::Replan(lessons) => learn_and_remake(ctx, division, learned, &lessons, allowance)?,
+                Instead::Replan(lessons) => {
+                    learn_and_replan(ctx, division, learned, (Step::Reconnect, &lessons), allowance)?
+                }
             }
         },
         // A piece that cannot take enough of its wall along costs only the plan.
@@ -145,7 +147,7 @@ fn rather_than_finish(
     allowance: &Allowance,
 ) -> Result<Option<Instead>, DesignError> {
     let plan = handover.found_plan();
-    let expected = foresight.expected_play(plan, &parts.contacts);
+    let expected = foresight.expect(plan, &parts.contacts);
     let (rattling, loose) = (expected.rattlers(), expected.loose());
     if allowance.may_stop_for(Step::Lengthen)
         && let Some(longer) = longer::for_play(ctx, division, &rattling, allowance)?
@@ -154,23 +156,20 @@ fn rather_than_finish(
     }
     if !rattling.is_empty()
         && allowance.may_stop_for(Step::JoinRattling)
-        && let Some(fewer) = join(
-            ctx,
-            &division.settings.segmentation,
-            &division.surface,
-            &loosest_half(&rattling),
-        )?
+        && let Some(fewer) = join(ctx, division, &loosest_half(&rattling))?
     {
         let change = Change::Divide(Step::JoinRattling, fewer, None);
         return Ok(Some(Instead::Change(change)));
     }
-    if loose.is_empty() || !allowance.may_stop_for(Step::Remake) {
+    if loose.is_empty() || !allowance.may_stop_for(Step::Reconnect) {
         return Ok(None);
     }
     let mut lessons: Vec<Lesson> = parts
         .weak_joints(handover, &division.sizes.sizes)
         .into_iter()
         .collect();
+    let shares = expected.held_shares(&loose).into_iter();
+    lessons.extend(shares.map(|(piece, share)| Lesson::BadlyHeld { piece, share }));
     lessons.push(Lesson::FailedPlan {
         plan: plan.clone(),
         loose,
@@ -241,13 +240,12 @@ fn plan_or_changes<T>(
                 let failure = learned.failure.after(failure);
                 let longer = longer::for_connectors(ctx, division, &failure.apart, allowance)?;
                 let change = divide(ctx, division, (&failure, learned.n_kits), allowance)?;
+                let cut_key = division.settings.cut_key();
+                let apart: Vec<PatchId> = (failure.apart.iter().copied())
+                    .filter(|piece| Some(*piece) != cut_key)
+                    .collect();
                 let fewer = match allowance.is_wanted(Step::JoinPredicted) {
-                    true => join(
-                        ctx,
-                        &division.settings.segmentation,
-                        &division.surface,
-                        &failure.apart,
-                    )?,
+                    true => join(ctx, division, &apart)?,
                     false => None,
                 };
                 let fewer = fewer.map(|surface| Change::Divide(Step::JoinPredicted, surface, None));
@@ -273,15 +271,15 @@ fn learn(
         Found::nothing(Failure::default())
     } else if kit.only_rattles() {
         // The search already chose the plan with the least rattling, so only other pieces help.
-        let rattling: Vec<(PatchId, f64)> = kit
-            .rattling_pieces()
-            .into_iter()
-            .map(|(piece, excess)| (kit.handover.patch(piece), excess))
-            .collect();
+        let of_patch = |play: RelativePlay| RelativePlay {
+            piece: kit.handover.patch(play.piece),
+            ..play
+        };
+        let rattling: Vec<RelativePlay> = kit.rattling_pieces().into_iter().map(of_patch).collect();
         let longer = longer::for_play(ctx, division, &rattling, allowance)?;
-        let patches: Vec<PatchId> = rattling.iter().map(|r| r.0).collect();
+        let patches: Vec<PatchId> = rattling.iter().map(|r| r.piece).collect();
         let fewer = match allowance.is_wanted(Step::JoinRattling) {
-            true => join(ctx, &division.settings.segmentation, &division.surface, &patches)?,
+            true => join(ctx, division, &patches)?,
             false => None,
         };
         let fewer = fewer.map(|surface| Change::Divide(Step::JoinRattling, surface, None));
@@ -289,7 +287,7 @@ fn learn(
             .with(longer)
             .with(fewer)
     } else {
-        learn_and_remake(ctx, division, learned, &kit.lessons(), allowance)?
+        learn_and_replan(ctx, division, learned, (Step::Remake, &kit.lessons()), allowance)?
     };
     Ok(Found {
         end: Some(kit),
@@ -298,18 +296,18 @@ fn learn(
 }
 
 /// Learns from a kit that failed or was given up, and offers another one.
-fn learn_and_remake(
+fn learn_and_replan(
     ctx: &Ctx,
     division: &Division,
     learned: &mut Learned,
-    lessons: &[Lesson],
+    (step, lessons): (Step, &[Lesson]),
     allowance: &Allowance,
 ) -> Result<Found<Kit>, DesignError> {
     learned.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
     for lesson in lessons {
         learned.add(lesson);
     }
-    another_plan(ctx, division, learned, (Step::Remake, lessons), allowance)
+    another_plan(ctx, division, learned, (step, lessons), allowance)
 }
 
 /// Offers another plan, which respects the lessons, or other pieces if no more plans are allowed.
@@ -391,7 +389,7 @@ pub(super) fn next_plan(
     if allowance.is_wanted(Step::JoinPredicted) && !rattling.is_empty() {
         late = allowance.late(Step::JoinPredicted);
         if late.is_none()
-            && let Some(fewer) = join(ctx, &settings.segmentation, surface, &loosest_half(&rattling))?
+            && let Some(fewer) = join(ctx, division, &loosest_half(&rattling))?
         {
             let change = Change::Divide(Step::JoinPredicted, fewer, None);
             return Ok(Next::Changes(vec![change], None));
@@ -428,9 +426,9 @@ pub(super) fn next_plan(
 
 /// The pieces to join first of those that would rattle, which come loosest first. Each that is joined holds
 /// its neighbours better, too, so the others may need no joining.
-fn loosest_half(rattling: &[(PatchId, f64)]) -> Vec<PatchId> {
+fn loosest_half(rattling: &[RelativePlay]) -> Vec<PatchId> {
     let half = &rattling[..rattling.len().div_ceil(2)];
-    half.iter().map(|r| r.0).collect()
+    half.iter().map(|r| r.piece).collect()
 }
 
 /// Searches for the cheapest plans, or for the reason why there is none. Most plans are changed before one is

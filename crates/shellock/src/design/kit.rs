@@ -11,7 +11,7 @@ use crate::body::{PatchDistances, ShellGrid};
 use crate::connector::SeamRoom;
 use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
-use crate::motion::SLIGHT;
+use crate::motion::{RelativePlay, SLIGHT};
 use crate::piece::{FinishParams, FinishedJoint, PressFit};
 use crate::plan::lesson::{self, Lesson};
 use crate::plan::{Handover, PlanProof};
@@ -133,11 +133,14 @@ impl Kit {
     }
 
     /// Pieces other than the key that rattle more than slightly, the loosest first. The key is left out
-    /// because it is cut where there is room for it. Each comes with the ratio of its play to what is
-    /// allowed.
-    pub fn rattling_pieces(&self) -> Vec<(PatchId, f64)> {
-        let pieces = self.strong_rattles().map(|r| (r.piece, r.excess));
-        pieces.filter(|(piece, _)| *piece != self.plan.key()).collect()
+    /// because it is cut where there is room for it.
+    pub fn rattling_pieces(&self) -> Vec<RelativePlay> {
+        let of_piece = |r: &Rattle| RelativePlay {
+            piece: r.piece,
+            excess: r.excess,
+        };
+        let others = self.strong_rattles().filter(|r| r.piece != self.plan.key());
+        others.map(of_piece).collect()
     }
 
     /// Returns the grade by which kits are compared.

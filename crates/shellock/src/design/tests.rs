@@ -15,10 +15,11 @@ use crate::body::BodyError;
 use crate::connector::SeamRoom;
 use crate::key::{KeyPrism, KeySite, Turn};
 use crate::metric::ChoiceError;
+use crate::motion::RelativePlay;
 use crate::piece::PieceError;
 use crate::plan::lesson::Lesson;
 use crate::plan::{Handover, PlanConstraints};
-use crate::segmentation::{SegmentationError, SegmentationParams};
+use crate::segmentation::{SegmentationError, SegmentationParams, Twins};
 use crate::strength::StrengthError;
 use crate::verify::Finding;
 use crate::{Cancelled, LatticeDirection, MakeError, PatchId, Progress};
@@ -48,7 +49,7 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
     let divided = || segmentation::divide(&ctx, &params, &surface, PatchId(0));
     assert!(matches!(divided(), Ok(Some(_))), "it can be divided");
     stop.store(true, Ordering::Relaxed);
-    let united = segmentation::unite(&ctx, &params, &surface, &[PatchId(0)]);
+    let united = segmentation::unite(&ctx, &params, &surface, &[PatchId(0)], &Twins::default());
     let stopped = [
         divided(),
         united,
@@ -70,7 +71,13 @@ fn a_slight_rattle_is_worth_no_other_kit() {
     let (slight, strong) = (passing(1.1), passing(1.3));
     assert!(slight.is_firm() && !slight.only_rattles() && slight.rattling_pieces().is_empty());
     assert!(!strong.is_firm() && strong.only_rattles());
-    assert!(matches!(strong.rattling_pieces()[..], [(PatchId(1), _)]));
+    assert!(matches!(
+        strong.rattling_pieces()[..],
+        [RelativePlay {
+            piece: PatchId(1),
+            ..
+        }]
+    ));
 }
 
 #[test]

@@ -8,6 +8,8 @@ use super::CUT_KEYS;
 pub(in crate::design) enum Step {
     /// Seeks another plan, since the last one could not be made: a piece could not take its wall along.
     Replan,
+    /// Seeks another plan, since the connectors of the last one came out too short to hold a piece.
+    Reconnect,
     /// Makes the kit of another plan, since the last kit failed.
     Remake,
     /// Enlarges connectors, since seams would open under a load.
@@ -68,9 +70,10 @@ const fn row(step: Step, begins: Level, within: Level, most: [usize; 2]) -> Row 
 pub(super) const ANY: usize = usize::MAX;
 
 /// Limits of all steps. A plan that is given up costs seconds, a joining that is predicted costs a search,
-/// and a kit costs most of a minute.
-pub(super) const TABLE: [Row; 12] = [
+/// and a kit costs most of a minute; one that is given up when its connectors are known costs half as much.
+pub(super) const TABLE: [Row; 13] = [
     row(Step::Replan, Level::Plan, Level::Division, [7, 7]),
+    row(Step::Reconnect, Level::Plan, Level::Division, [2, 2]),
     row(Step::Remake, Level::Plan, Level::Division, [1, ANY]),
     row(Step::Enlarge, Level::Division, Level::Key, [2, 2]),
     row(Step::Lengthen, Level::Division, Level::Key, [4, 4]),
@@ -100,6 +103,7 @@ impl Step {
     pub fn words(self) -> &'static str {
         match self {
             Self::Replan => "try another plan, as a piece could not take its wall along",
+            Self::Reconnect => "try another plan, as connectors came out too short",
             Self::Remake => "make the kit of another plan",
             Self::Enlarge => "try larger connectors where seams would open",
             Self::Lengthen => "lengthen seams of pieces that would come loose",
