@@ -35,7 +35,7 @@ const WALL_HEIGHT_MM: f64 = 1.0;
 
 /// Share of the estimated hold that counts: carving removes 10 to 30 % of the joints, and their ends are
 /// shortened.
-const LEFT_SHARE: f64 = 0.6;
+pub(super) const LEFT_SHARE: f64 = 0.6;
 
 /// Hold of a contact in one order and direction, mm³ for each push: first of the later piece, then of the
 /// earlier one.

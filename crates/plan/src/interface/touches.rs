@@ -11,6 +11,7 @@ use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 use shellock_report::PatchId;
 
 use super::Interface;
+use super::blocking::LEFT_SHARE;
 use super::obstruction::Leave;
 use super::sample::{Kind, Sample, Way};
 use crate::{LatticePlan, PlanParams};
@@ -19,10 +20,6 @@ use crate::{LatticePlan, PlanParams};
 const STEP: usize = 3;
 /// Depths at which walls touch, as shares of their thickness.
 const DEPTHS: [f64; 2] = [0.1, 0.9];
-/// Shares of a wall's height and of a pin's length that count as a hold: walls are rounded, and carving
-/// removes 10 to 30 % of the joints and shortens their ends.
-const WALL_SHARE: f64 = 0.6;
-const PIN_SHARE: f64 = 0.6;
 
 /// Contacts of the walls of all pieces, with the gaps of walls.
 pub fn wall_contacts(params: &PlanParams, interfaces: &[Interface], plan: &LatticePlan) -> Vec<Contact> {
@@ -35,7 +32,7 @@ pub fn wall_contacts(params: &PlanParams, interfaces: &[Interface], plan: &Latti
 fn walls(params: &PlanParams, interface: &Interface, plan: &LatticePlan) -> Vec<Contact> {
     let (side, [later, earlier]) = order(interface, plan);
     let s = plan.separation(later).unit();
-    let height_mm = WALL_SHARE * params.wall_mm / DEPTHS.len() as f64;
+    let height_mm = LEFT_SHARE * params.wall_mm / DEPTHS.len() as f64;
     let at = |x: &Sample, depth: f64| Contact {
         a: later,
         b: earlier,
@@ -96,7 +93,7 @@ fn pins(params: &PlanParams, interface: &Interface, plan: &LatticePlan, leaves: 
         for run in runs.into_iter().filter(|run| run.is_made(interface.size_mm)) {
             let last = run.samples.len() - 1;
             let places: Vec<usize> = (0..=last).filter(|i| i % STEP == 0 || *i == last).collect();
-            let length_mm = PIN_SHARE * run.length_mm / places.len() as f64;
+            let length_mm = LEFT_SHARE * run.length_mm / places.len() as f64;
             let samples = places.iter().map(|i| &line.samples[run.samples[*i]]);
             let faces = samples.flat_map(|x| faces(run.kind, interface.size_mm, x, s, side));
             found.extend(faces.map(|face| contact(face, length_mm)));
@@ -301,7 +298,7 @@ mod tests {
             let facing = pins.iter().filter(|c| c.normal.dot(way) > 0.99);
             facing.map(|c| c.area_mm2).sum()
         };
-        let side_mm2 = PIN_SHARE * run_mm * PIN_DEPTH * size_mm;
+        let side_mm2 = LEFT_SHARE * run_mm * PIN_DEPTH * size_mm;
         for way in [Vec3::Y, Vec3::NEG_Y] {
             assert!(
                 (area_mm2(way) / side_mm2 - 1.0).abs() < 1e-6,

@@ -168,7 +168,7 @@ fn rather_than_finish(
         .weak_joints(handover, &division.sizes.sizes)
         .into_iter()
         .collect();
-    let shares = expected.held_shares(&loose).into_iter();
+    let shares = expected.held_shares().into_iter();
     lessons.extend(shares.map(|(piece, share)| Lesson::BadlyHeld { piece, share }));
     lessons.push(Lesson::FailedPlan {
         plan: plan.clone(),

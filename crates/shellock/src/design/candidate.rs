@@ -2,6 +2,9 @@
 
 use std::borrow::Cow;
 
+use shellock_divide::widen;
+use shellock_geom::Solid;
+
 use super::division::Division;
 use super::job::Job;
 use super::{DesignError, KeySource, Settings};
@@ -9,8 +12,6 @@ use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
 use crate::piece::Grip;
 use crate::segmentation::Plane;
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, sizes};
-use shellock_divide::widen;
-use shellock_geom::Solid;
 
 /// A key that is cut.
 pub(super) struct CutKey {

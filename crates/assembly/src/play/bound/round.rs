@@ -319,14 +319,7 @@ impl<'a> Round<'a> {
             );
         }
         self.add_lines(&mut quantities, &mut ends);
-        let rows: BTreeSet<usize> = ends
-            .values()
-            .flatten()
-            .flatten()
-            .flatten()
-            .flatten()
-            .map(|r| r.0)
-            .collect();
+        let rows = rows_of(&ends);
         let name_of: BTreeMap<usize, usize> = ends.keys().copied().zip(0..).collect();
         let contact = |row: usize| self.system.rows[row].contact;
         let of_bearings: Vec<usize> = rows
@@ -365,14 +358,7 @@ impl<'a> Round<'a> {
     /// Bounds the pieces' own quantities along the other lines of the lattice, by rows that the proof already
     /// uses.
     fn add_lines(&self, quantities: &mut BTreeMap<usize, Quantity>, ends: &mut BTreeMap<usize, Ends>) {
-        let known: BTreeSet<usize> = ends
-            .values()
-            .flatten()
-            .flatten()
-            .flatten()
-            .flatten()
-            .map(|r| r.0)
-            .collect();
+        let known = rows_of(ends);
         let late = |row: usize| {
             if known.contains(&row) {
                 self.bound_mm(row)
@@ -398,4 +384,11 @@ impl<'a> Round<'a> {
             }
         }
     }
+}
+
+/// Rows that end any direction of any quantity.
+fn rows_of(ends: &BTreeMap<usize, Ends>) -> BTreeSet<usize> {
+    let of_axes = ends.values().flatten();
+    let of_ways = of_axes.flatten().flatten();
+    of_ways.flatten().map(|row| row.0).collect()
 }
