@@ -38,6 +38,7 @@ pub(crate) use contacts::contacts;
 pub use frame::{Curve, curves};
 pub use free::is_unobstructed;
 pub(crate) use outline::{Half, whole_half};
+pub(crate) use profile::WHOLE;
 pub use profile::{ProfileRect, Section};
 pub(crate) use rail::{rail_places, stop_mm};
 pub use run::{SeamRoom, runs};

@@ -25,6 +25,9 @@ pub const CHANNEL_DEPTH: f64 = PIN_DEPTH + FLOOR;
 /// Least thickness of pins, channel walls and floors, tongues and lips, mm, at any size: two lines of a
 /// filament printer, twenty pixels of a resin printer.
 pub const LEAST_PART_MM: f64 = 1.0;
+/// Least thickness of the foot, mm. The wall that it hangs from begins a gap beside the seam, so the foot's
+/// root in it is that much narrower.
+pub const LEAST_FOOT_MM: f64 = LEAST_PART_MM + 0.2;
 
 /// Thickness of a stop, which closes an end of a channel, mm.
 pub const STOP_MM: f64 = LEAST_PART_MM;

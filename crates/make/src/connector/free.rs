@@ -5,13 +5,9 @@ use shellock_geom::Vec3;
 use shellock_report::PatchId;
 
 use super::ConnectorParams;
-use super::profile::{ProfileRect, Section};
+use super::profile::{ProfileRect, Section, WHOLE};
 use super::station::RunStation;
 use crate::body::{ShellBodies, ShellGrid};
-
-/// Distance of the points that must be free from a part's sides, as a share of its width: sampled fields
-/// round off the edges of walls.
-const FROM_SIDE: f64 = 0.16;
 
 /// Returns a test of a piece and a point: `None` in or above the wall, else true if connectors of the piece
 /// may be there. The point must be clear of its way out and of later pieces' ways, by the clearance.
@@ -38,30 +34,44 @@ pub fn is_unobstructed<'a>(
     }
 }
 
-/// Share of a section that must be free where connectors are carved to the room that they have.
-pub(super) const MOST_OF_IT: f64 = 0.6;
-/// Share of a section that must be free where it stays whole.
-pub(super) const ALL_OF_IT: f64 = 1.0;
+/// Amount of a section that must be free, as far as it lies below the wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Needed {
+    /// Each part, as far as it counts as [`WHOLE`].
+    Whole,
+    /// Most of each half; carving removes the rest.
+    Most,
+}
 
-/// Returns true if both halves have room for at least `share` of their section, as far as it lies below the
-/// wall.
+/// Share of a half that must be free where connectors are carved to the room that they have.
+const MOST: f64 = 0.6;
+
+/// Returns true if both halves have as much room as is `needed`.
 pub(super) fn has_room(
     params: &ConnectorParams,
     station: &RunStation,
     male: PatchId,
     female: PatchId,
-    share: f64,
+    needed: Needed,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
 ) -> bool {
     let section = Section::at(params, station);
     let halves: [(PatchId, &[Option<ProfileRect>]); 2] = [(male, &section.male), (female, &section.female)];
     halves.iter().all(|(piece, parts)| {
-        let places = parts.iter().flatten().flat_map(|part| part.points(FROM_SIDE));
-        let (n_free, n) = places
-            .filter_map(|[n, s]| is_free(*piece, station.place(n, s)))
-            .fold((0, 0), |(n_free, n), is_free| {
-                (n_free + u32::from(is_free), n + 1)
-            });
-        n > 0 && f64::from(n_free) >= share * f64::from(n)
+        let is_free = |part: &ProfileRect| -> Vec<bool> {
+            let places = part.points().map(|[n, s]| station.place(n, s));
+            places.filter_map(|at| is_free(*piece, at)).collect()
+        };
+        let of_parts: Vec<Vec<bool>> = parts.iter().flatten().map(is_free).collect();
+        let has = |share: f64, points: &[bool]| {
+            let n_free = points.iter().filter(|is_free| **is_free).count();
+            n_free as f64 >= share * points.len() as f64
+        };
+        let half = of_parts.concat();
+        !half.is_empty()
+            && match needed {
+                Needed::Whole => of_parts.iter().all(|part| has(WHOLE, part)),
+                Needed::Most => has(MOST, &half),
+            }
     })
 }

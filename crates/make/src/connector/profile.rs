@@ -1,7 +1,7 @@
 //! Cross-section of a connector: rectangles of pin, foot and channel.
 
 use shellock_geom::Vec3;
-use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, LEAST_PART_MM, PIN_DEPTH, PIN_WIDTH};
+use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, LEAST_FOOT_MM, LEAST_PART_MM, PIN_DEPTH, PIN_WIDTH};
 
 use super::ConnectorParams;
 use super::station::{RailPart, RunShape, RunStation};
@@ -30,12 +30,13 @@ impl ProfileRect {
         }
     }
 
-    /// Five by five points inside, along `n` and ŝ, mm. The outer ones keep the share `from_side` of the
-    /// width from the sides.
-    pub fn points(self, from_side: f64) -> impl Iterator<Item = [f64; 2]> {
+    /// Five by five points inside, along `n` and ŝ, mm. The outer ones keep a share of the width from the
+    /// sides, since clearances and sampled fields round off edges.
+    pub fn points(self) -> impl Iterator<Item = [f64; 2]> {
         const N: usize = 5;
+        const FROM_SIDE: f64 = 0.16;
         let between = move |from: f64, to: f64, i: usize| {
-            let at = from_side + (1.0 - 2.0 * from_side) * i as f64 / (N - 1) as f64;
+            let at = FROM_SIDE + (1.0 - 2.0 * FROM_SIDE) * i as f64 / (N - 1) as f64;
             from + (to - from) * at
         };
         (0..N * N).map(move |i| [between(self.n0, self.n1, i % N), between(self.s0, self.s1, i / N)])
@@ -52,6 +53,10 @@ impl ProfileRect {
         .map(|(n, s)| at.place(n, s))
     }
 }
+
+/// Least share of the [points](ProfileRect::points) of each part of a section that is free before carving, and
+/// left by it, where the section counts as whole.
+pub(crate) const WHOLE: f64 = 0.9;
 
 /// The cross-section at a station: convex parts whose unions are the male and the female half.
 #[derive(Clone, Debug, PartialEq)]
@@ -186,7 +191,7 @@ impl Section {
         // Stretch along ŝ, which leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
         let pin_width = (PIN_WIDTH * d).max(LEAST_PART_MM + c);
-        let foot_width = (FOOT_WIDTH * d).max(LEAST_PART_MM);
+        let foot_width = (FOOT_WIDTH * d).max(LEAST_FOOT_MM);
         let wall = (PIN_WIDTH * d - c).max(LEAST_PART_MM);
         let bottom = (FLOOR * d).max(LEAST_PART_MM);
         let lean = pin_width * backward.tan();

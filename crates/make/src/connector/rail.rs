@@ -9,7 +9,7 @@ use shellock_surface::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, SHORTEST_RA
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::free::{MOST_OF_IT, has_room};
+use super::free::{Needed, has_room};
 use super::station::{RailPart, Run, RunShape, RunStation};
 
 /// Greatest deviation of the seam from a straight line, across, and of the wall's inner side, up and down, in
@@ -204,7 +204,7 @@ fn rail(
                 &station(arc(i), RailPart::Full),
                 male,
                 female,
-                MOST_OF_IT,
+                Needed::Most,
                 is_free,
             )
         })
@@ -216,7 +216,14 @@ fn rail(
     }
     let places = rail_places([start, end], size_mm, clearance_mm);
     let (stop_mm, stop) = places[4];
-    let has_stop = has_room(params, &station(stop_mm, stop), male, female, MOST_OF_IT, is_free);
+    let has_stop = has_room(
+        params,
+        &station(stop_mm, stop),
+        male,
+        female,
+        Needed::Most,
+        is_free,
+    );
     let made = places.into_iter().take(if has_stop { 5 } else { 3 });
     let stations = made.map(|(arc_mm, part)| station(arc_mm, part)).collect();
     Some(Run {

@@ -11,7 +11,7 @@ use shellock_surface::seam::rules::{
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::free::{ALL_OF_IT, MOST_OF_IT, has_room};
+use super::free::{Needed, has_room};
 use super::profile::Section;
 use super::rail::rails;
 use super::station::{Run, RunShape, RunStation};
@@ -135,9 +135,9 @@ impl<'a> Line<'a> {
         is_clear: &dyn Fn(PatchId, Vec3) -> Option<bool>,
         is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
     ) -> Vec<Run> {
-        let whole = self.runs_with(params, ALL_OF_IT, is_clear);
+        let whole = self.runs_with(params, Needed::Whole, is_clear);
         if whole.is_empty() {
-            return self.runs_with(params, MOST_OF_IT, is_free);
+            return self.runs_with(params, Needed::Most, is_free);
         }
         whole
     }
@@ -145,7 +145,7 @@ impl<'a> Line<'a> {
     fn runs_with(
         &self,
         params: &ConnectorParams,
-        share: f64,
+        needed: Needed,
         is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
     ) -> Vec<Run> {
         let at = |i: usize, size_mm: f64| RunStation {
@@ -157,7 +157,7 @@ impl<'a> Line<'a> {
             let crosses_before = i > 0 && cross(params, &at(i - 1, station.size_mm), station);
             let last = self.stations.len() - 1;
             let crosses_after = i < last && cross(params, station, &at(i + 1, station.size_mm));
-            !crosses_before && !crosses_after && has_room(params, station, male, female, share, is_free)
+            !crosses_before && !crosses_after && has_room(params, station, male, female, needed, is_free)
         };
         let (mut stations, mut allowed) = (self.stations.clone(), self.allowed.clone());
         fit_sizes(&mut stations, &mut allowed, &has_room);

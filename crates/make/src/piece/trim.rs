@@ -4,15 +4,11 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 use shellock_surface::seam::rules::SHORTEST_RUN_SIZES;
 
-use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section, without_thin_stops};
+use crate::connector::{ConnectorParams, ProfileRect, Run, RunStation, Section, WHOLE, without_thin_stops};
 
 /// Distance between the sections that are looked at, mm.
 const STEP_MM: f64 = 0.5;
-/// Distance of the points that are compared from a part's sides, as a share of its width.
-const FROM_SIDE: f64 = 0.1;
-/// Least share of each part of a section that is left where a run counts as whole, and where it counts at
-/// all. Points on a part's edge, which clearances round off, make up a tenth.
-const WHOLE: f64 = 0.9;
+/// Least share of each part of a section that is left where a run counts at all.
 const MOST: f64 = 0.5;
 /// Least width to which a half should be rooted in its wall, mm, unless the whole half is narrower there. A
 /// tenth less ([`WHOLE`]) is the neck that the verification accepts.
@@ -187,7 +183,7 @@ fn points_between(
     (b, at_b): (&RunStation, ProfileRect),
     t: f64,
 ) -> Vec<Vec3> {
-    let pairs = at_a.points(FROM_SIDE).zip(at_b.points(FROM_SIDE));
+    let pairs = at_a.points().zip(at_b.points());
     let place = |at: &RunStation, [n, s]: [f64; 2]| at.place(n, s);
     pairs
         .map(|(in_a, in_b)| place(a, in_a).lerp(place(b, in_b), t))
