@@ -75,3 +75,36 @@ pub(super) fn has_room(
             }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::connector::RunShape;
+
+    #[test]
+    fn a_section_with_a_shaved_edge_is_whole_and_one_without_half_a_wall_is_not() {
+        let params = ConnectorParams::default();
+        let station = RunStation {
+            point: Vec3::ZERO,
+            tangent: Vec3::X,
+            n: Vec3::Y,
+            s: Vec3::Z,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm: 0.0,
+            size_mm: 3.0,
+            clearance_mm: 0.12,
+            shape: RunShape::Seam,
+        };
+        let far = Section::at(&params, &station).female[1].expect("a channel has two walls");
+        let width_mm = far.n1 - far.n0;
+        // The channel's far wall is free from a distance of its outer side on.
+        let has_room = |from_side_mm: f64, needed| {
+            let is_free = |piece: PatchId, p: Vec3| Some(piece == PatchId(1) || p.y >= far.n0 + from_side_mm);
+            has_room(&params, &station, PatchId(1), PatchId(0), needed, &is_free)
+        };
+        assert!(has_room(0.1 * width_mm, Needed::Whole));
+        assert!(!has_room(0.5 * width_mm, Needed::Whole) && has_room(0.5 * width_mm, Needed::Most));
+        assert!(!has_room(4.0 * width_mm, Needed::Most));
+    }
+}

@@ -54,8 +54,8 @@ impl ProfileRect {
     }
 }
 
-/// Least share of the [points](ProfileRect::points) of each part of a section that is free before carving, and
-/// left by it, where the section counts as whole.
+/// Least share of the [points](ProfileRect::points) of each part of a section that is free before carving,
+/// and left by it, where the section counts as whole.
 pub(crate) const WHOLE: f64 = 0.9;
 
 /// The cross-section at a station: convex parts whose unions are the male and the female half.

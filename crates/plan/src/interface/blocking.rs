@@ -33,8 +33,8 @@ use crate::PlanParams;
 const WALL_GAP_MM: f64 = 0.1;
 const WALL_HEIGHT_MM: f64 = 1.0;
 
-/// Share of the estimated hold that counts: carving removes 10 to 30 % of the joints, and their ends are
-/// shortened.
+/// Share of the estimated hold that counts: about four fifths of the length that a plan predicts are left,
+/// and stops shorten the pins (docs/notes/metrics.md).
 pub(super) const LEFT_SHARE: f64 = 0.6;
 
 /// Hold of a contact in one order and direction, mm³ for each push: first of the later piece, then of the
