@@ -1,5 +1,6 @@
 //! Proportions of a connector, as multiples of its size D. Planning, simulation and manufacture share this
-//! one shape. Parts of connectors smaller than 2.3 mm are made thicker than this, [`LEAST_PART_MM`] at least.
+//! one shape. Parts of connectors smaller than 2.4 mm are made thicker than this: [`LEAST_PART_MM`] at least,
+//! and [`LEAST_FOOT_MM`] for the foot.
 //!
 //! ```text
 //!       female │ male         ↑ ŝ

@@ -82,7 +82,7 @@ mod tests {
     use crate::connector::RunShape;
 
     #[test]
-    fn a_section_with_a_shaved_edge_is_whole_and_one_without_half_a_wall_is_not() {
+    fn a_section_that_loses_a_corner_is_whole_and_one_that_loses_a_side_is_not() {
         let params = ConnectorParams::default();
         let station = RunStation {
             point: Vec3::ZERO,
@@ -97,14 +97,28 @@ mod tests {
             shape: RunShape::Seam,
         };
         let far = Section::at(&params, &station).female[1].expect("a channel has two walls");
-        let width_mm = far.n1 - far.n0;
-        // The channel's far wall is free from a distance of its outer side on.
-        let has_room = |from_side_mm: f64, needed| {
-            let is_free = |piece: PatchId, p: Vec3| Some(piece == PatchId(1) || p.y >= far.n0 + from_side_mm);
+        let points: Vec<[f64; 2]> = far.points().collect();
+        // Points of the channel's far wall that are not free, by their place in the list, and all else is.
+        let has_room = |n_lost: usize, needed| {
+            let is_lost = |p: Vec3| {
+                points[..n_lost]
+                    .iter()
+                    .any(|[n, s]| station.place(*n, *s).distance(p) < 1e-9)
+            };
+            let is_free = |piece: PatchId, p: Vec3| Some(piece == PatchId(1) || !is_lost(p));
             has_room(&params, &station, PatchId(1), PatchId(0), needed, &is_free)
         };
-        assert!(has_room(0.1 * width_mm, Needed::Whole));
-        assert!(!has_room(0.5 * width_mm, Needed::Whole) && has_room(0.5 * width_mm, Needed::Most));
-        assert!(!has_room(4.0 * width_mm, Needed::Most));
+        // Two of 25 points are a corner, five a side, 25 a third of the half.
+        assert!(has_room(2, Needed::Whole) && !has_room(5, Needed::Whole));
+        assert!(has_room(25, Needed::Most));
+        let nothing_free = |piece: PatchId, _| Some(piece == PatchId(1));
+        assert!(!super::has_room(
+            &params,
+            &station,
+            PatchId(1),
+            PatchId(0),
+            Needed::Most,
+            &nothing_free
+        ));
     }
 }
