@@ -6,6 +6,9 @@
 //! stays constant, so that a bump in a wide plain is not averaged away.
 
 mod caps;
+mod shown;
+
+pub use shown::decimate_for_display;
 
 use glam::DMat3;
 use rayon::prelude::*;
@@ -497,7 +500,7 @@ mod tests {
     }
 
     /// Two balls that overlap: their union has slivers along the curve where they meet.
-    fn two_balls() -> TriMesh {
+    pub(super) fn two_balls() -> TriMesh {
         let ball = body(11.0, |p| 10.0 - p.length());
         let moved = TriMesh {
             points: ball

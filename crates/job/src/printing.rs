@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use shellock::{PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::decimate::decimate;
+use shellock_geom::decimate::decimate_for_display;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::load::Load;
@@ -261,8 +261,10 @@ impl Printing {
 pub fn simplify(pieces: &[TriMesh]) -> Vec<TriMesh> {
     let all = pieces.iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
     let tolerance_mm = SEEN * all.diagonal();
-    let simple = |mesh: &TriMesh| decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
-    pieces.par_iter().map(simple).collect()
+    pieces
+        .par_iter()
+        .map(|mesh| decimate_for_display(mesh, tolerance_mm))
+        .collect()
 }
 
 /// Piece in its pose on the plate.

@@ -8,7 +8,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
-use shellock_geom::decimate::decimate;
+use shellock_geom::decimate::decimate_for_display;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_report::{PatchId, Warning};
 
@@ -78,9 +78,10 @@ fn drafts(pieces: &[ReportPiece<'_>]) -> Vec<TriMesh> {
         .iter()
         .fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
     let tolerance_mm = DRAFT * all.diagonal();
-    let draft =
-        |piece: &ReportPiece<'_>| decimate(piece.mesh.clone(), &vec![tolerance_mm; piece.mesh.points.len()]);
-    pieces.par_iter().map(draft).collect()
+    pieces
+        .par_iter()
+        .map(|piece| decimate_for_display(piece.mesh, tolerance_mm))
+        .collect()
 }
 
 /// Header that the viewer reads. Its terms are those of any scene, not of shells.
