@@ -13,6 +13,8 @@ use crate::{TriMesh, Vec3};
 const LEAST_MM2: f64 = 0.01;
 /// Distance from a face at which there must be air, mm.
 const IN_FRONT_MM: f64 = 2e-3;
+/// Factor by which limits are stricter before rounding, which moves points by up to 0.02 µm.
+const ROUNDING_MARGIN: f64 = 1.1;
 /// Directions of the rays, turned to the side that the face looks at. All of them must meet material: one ray
 /// may pass through an edge.
 const DIRECTIONS: [Vec3; 3] = [
@@ -24,9 +26,19 @@ const DIRECTIONS: [Vec3; 3] = [
 /// Returns the faces of a closed mesh that have material 2 µm in front of their middle, in order. Faces of
 /// 0.01 mm² and less are left out. `bvh` is that of the mesh.
 pub fn folded_faces(mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
+    faces_that_fold(mesh, bvh, 1.0)
+}
+
+/// Returns the faces of a closed mesh that fold, or may fold once their points are rounded to the 32-bit
+/// coordinates of files. `bvh` is that of the mesh.
+pub(crate) fn nearly_folded_faces(mesh: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
+    faces_that_fold(mesh, bvh, ROUNDING_MARGIN)
+}
+
+fn faces_that_fold(mesh: &TriMesh, bvh: &TriangleBvh, margin: f64) -> Vec<u32> {
     let is_folded = |&face: &u32| {
-        let is_large = mesh.double_area_vector(face as usize).length() > 2.0 * LEAST_MM2;
-        is_large && has_material_in_front(mesh, bvh, face, IN_FRONT_MM)
+        let is_large = mesh.double_area_vector(face as usize).length() > 2.0 * LEAST_MM2 / margin;
+        is_large && has_material_in_front(mesh, bvh, face, IN_FRONT_MM * margin)
     };
     (0..mesh.triangles.len() as u32)
         .into_par_iter()

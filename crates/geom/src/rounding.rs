@@ -149,37 +149,62 @@ fn coincident(mesh: &TriMesh) -> Vec<Vec<u32>> {
     groups
 }
 
-/// Moves the points of all groups inwards. A point joined to its twin by an edge stays, since the edge will
-/// collapse.
+/// Moves the points of all groups apart: tips of material inwards, and outwards where all of a group are
+/// bottoms of pits, which would otherwise pass through each other. A point joined to its twin by an edge
+/// stays, since the edge will collapse.
 fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
     let group_of: HashMap<u32, usize> = groups
         .iter()
         .enumerate()
         .flat_map(|(g, members)| members.iter().map(move |&v| (v, g)))
         .collect();
-    let mut normals: HashMap<u32, Vec3> = HashMap::new();
-    let mut joined: HashMap<u32, bool> = HashMap::new();
+    let mut fans: HashMap<u32, Fan> = HashMap::new();
     for (f, t) in mesh.triangles.iter().enumerate() {
-        for &v in t.iter().filter(|v| group_of.contains_key(v)) {
-            *normals.entry(v).or_default() += mesh.double_area_vector(f);
-            let twin = t.iter().any(|w| *w != v && group_of.get(w) == group_of.get(&v));
-            *joined.entry(v).or_default() |= twin;
+        for (k, &v) in t.iter().enumerate().filter(|(_, v)| group_of.contains_key(v)) {
+            let fan = fans.entry(v).or_default();
+            let [a, b] = [t[(k + 1) % 3], t[(k + 2) % 3]];
+            let tip = mesh.points[v as usize];
+            let edges = [a, b].map(|w| (mesh.points[w as usize] - tip).normalize_or_zero());
+            fan.normal += mesh.double_area_vector(f);
+            fan.edges += edges[0].angle_between(edges[1]) * (edges[0] + edges[1]);
+            fan.has_twin |= [a, b].iter().any(|w| group_of.get(w) == group_of.get(&v));
         }
     }
     for members in groups {
+        let are_pits = members.iter().all(|v| fans.get(v).is_some_and(Fan::is_pit));
+        let sign = if are_pits { 1.0 } else { -1.0 };
         for (rank, v) in members.iter().enumerate() {
-            if !joined.get(v).copied().unwrap_or(false) {
-                let inwards = -normals.get(v).copied().unwrap_or_default().normalize_or_zero();
+            if let Some(fan) = fans.get(v).filter(|fan| !fan.has_twin) {
                 // Distances differ by rank, so that members with the same normal separate, too.
-                mesh.points[*v as usize] += inwards * by_mm * (1.0 + 0.5 * rank as f64);
+                let away_mm = sign * by_mm * (1.0 + 0.5 * rank as f64);
+                mesh.points[*v as usize] += fan.normal.normalize_or_zero() * away_mm;
             }
         }
+    }
+}
+
+/// Surface around a point.
+#[derive(Default)]
+struct Fan {
+    /// Sum of the triangles' normals, each twice the triangle's area.
+    normal: Vec3,
+    /// Sum of the directions in which the triangles lead away, weighted by their angles.
+    edges: Vec3,
+    /// True if an edge joins the point to another at the same place.
+    has_twin: bool,
+}
+
+impl Fan {
+    /// Returns true if the point is the bottom of a pit: the surface rises from it on the whole.
+    fn is_pit(&self) -> bool {
+        self.edges.dot(self.normal) > 0.0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::repair::crossing_faces;
     use crate::samples::cuboid;
 
     #[test]
@@ -201,6 +226,25 @@ mod tests {
         let mesh = printable(&both).unwrap();
         assert!(coincident(&mesh).is_empty());
         assert!((mesh.signed_volume() - 2.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn hollows_that_touch_along_an_edge_come_apart_without_crossing() {
+        let mut mesh = cuboid([-1.0; 3], [3.0; 3]).to_mesh();
+        for (low, high) in [([0.0; 3], [1.0; 3]), ([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])] {
+            let hollow = cuboid(low, high).to_mesh();
+            let first = mesh.points.len() as u32;
+            mesh.points.extend(&hollow.points);
+            let inwards = hollow
+                .triangles
+                .iter()
+                .map(|&[a, b, c]| [a, c, b].map(|v| v + first));
+            mesh.triangles.extend(inwards);
+        }
+        let apart = printable(&Volume::from_closed_mesh(&mesh).unwrap()).unwrap();
+        assert!(coincident(&apart).is_empty());
+        assert!(crossing_faces(&apart).is_empty());
+        assert!((apart.signed_volume() - 62.0).abs() < 0.03);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::bvh::TriangleBvh;
 use crate::decimate::{decimate, decimate_at_folds};
-use crate::fold::folded_faces;
+use crate::fold::nearly_folded_faces;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
 
@@ -30,7 +30,7 @@ const GENTLER: f64 = 0.25;
 const AT_FOLD_MM: f64 = 0.5;
 /// Attempts to be rid of folds: distance from a fold up to which points may move, mm, and the distance by
 /// which they may, as a share of [`Reach::at_folds_mm`].
-const ATTEMPTS_AT_FOLDS: [(f64, f64); 3] = [(0.25, 0.6), (0.25, 1.0), (0.5, 1.0)];
+const ATTEMPTS_AT_FOLDS: [(f64, f64); 4] = [(0.25, 0.25), (0.25, 0.4), (0.5, 0.4), (0.5, 1.0)];
 /// Largest number of rounds of closing notches.
 const MOST_CLOSING_ROUNDS: usize = 6;
 /// Largest number of rounds of restoring triangles that cross.
@@ -135,7 +135,7 @@ impl Job<'_> {
                 continue;
             };
             let mesh = simplified.solid.mesh();
-            let n_folds = folded_faces(mesh, &TriangleBvh::new(mesh)).len();
+            let n_folds = nearly_folded_faces(mesh, &TriangleBvh::new(mesh)).len();
             if best.as_ref().is_none_or(|best| n_folds < best.0) {
                 best = Some((n_folds, simplified));
             }
@@ -170,7 +170,7 @@ impl Job<'_> {
                 crossed = crossing_faces(&few);
                 match room {
                     Some(room) => crossed.extend(room.folds[1].new_in(&few, &new)),
-                    None if !folded_faces(&few, &new).is_empty() => return Outcome::Folded,
+                    None if !nearly_folded_faces(&few, &new).is_empty() => return Outcome::Folded,
                     None => {}
                 }
             }
@@ -292,7 +292,7 @@ struct Folds {
 
 impl Folds {
     fn of(mesh: &TriMesh, bvh: &TriangleBvh) -> Self {
-        let faces = folded_faces(mesh, bvh);
+        let faces = nearly_folded_faces(mesh, bvh);
         let triangles: Vec<[u32; 3]> = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
         let points = triangles.concat();
         let folded = TriMesh {
@@ -314,7 +314,7 @@ impl Folds {
 
     /// Returns the faces of `few` that fold at other places.
     fn new_in(&self, few: &TriMesh, bvh: &TriangleBvh) -> Vec<u32> {
-        let mut found = folded_faces(few, bvh);
+        let mut found = nearly_folded_faces(few, bvh);
         found.retain(|&face| !self.are_within(AT_FOLD_MM, few.face_center(face as usize)));
         found
     }
@@ -458,7 +458,7 @@ mod tests {
     }
 
     fn folds(mesh: &TriMesh) -> Vec<u32> {
-        folded_faces(mesh, &TriangleBvh::new(mesh))
+        nearly_folded_faces(mesh, &TriangleBvh::new(mesh))
     }
 
     #[test]

@@ -27,6 +27,9 @@ const CELL_LENGTH_MM: f64 = 6.0;
 const LEAST_SHARE: f64 = 0.5;
 const LEAST_SIZE_MM: f64 = 2.0;
 const N_SIZES: usize = 6;
+/// Least advance of a section's corners, as a share of the seam's. Where the inner side of a bend stood
+/// still, sections between two stations would cross, and the wall there would fold by some micrometres.
+const LEAST_ADVANCE: f64 = 0.05;
 /// Greatest change of the size along the seam, mm per mm.
 const MOST_WIDENING: f64 = 0.25;
 
@@ -312,16 +315,20 @@ fn fit_sizes(
     }
 }
 
-/// Returns true if the sections at two successive stations meet: a corner of one is not on its own side of
-/// the plane of the other.
+/// Returns true if the sections at two successive stations meet or nearly do: on the inner side of a bend, a
+/// corner advances by less than [`LEAST_ADVANCE`] of the seam's way between the planes of the two.
 fn cross(params: &ConnectorParams, a: &RunStation, b: &RunStation) -> bool {
     let outer = |at: &RunStation| Section::at(params, at).bounds().corners(at);
     let forward = |at: &RunStation| {
         let normal = at.n.cross(at.s);
         normal * normal.dot(at.tangent).signum()
     };
-    let is_ahead = outer(b).iter().all(|p| (*p - a.point).dot(forward(a)) > 0.0);
-    let is_behind = outer(a).iter().all(|p| (*p - b.point).dot(forward(b)) < 0.0);
+    let advances = |from: &RunStation, corners: [Vec3; 4], of: Vec3, along: Vec3| {
+        let least_mm = LEAST_ADVANCE * (of - from.point).dot(along).max(0.0);
+        corners.iter().all(|p| (*p - from.point).dot(along) > least_mm)
+    };
+    let is_ahead = advances(a, outer(b), b.point, forward(a));
+    let is_behind = advances(b, outer(a), a.point, -forward(b));
     !(is_ahead && is_behind)
 }
 
@@ -385,5 +392,51 @@ mod tests {
         assert!(size(10) <= 2.5 && size(10) >= LEAST_SIZE_MM);
         assert!((0..24).all(|i| (size(i + 1) - size(i)).abs() <= MOST_WIDENING + 1e-12));
         assert_eq!((size(0), size(20), size(30)), (4.0, 4.0, 4.0));
+    }
+
+    /// Stops and trimming put stations between those that were chosen.
+    #[test]
+    fn stations_between_two_that_do_not_cross_advance_on_all_sides() {
+        let params = ConnectorParams::default();
+        let mut n_accepted = 0;
+        for radius_mm in (240..320).map(|i| 0.01 * f64::from(i)) {
+            // Clockwise, so that the deep side of the section lies on the inner side of the bend.
+            let at = |arc_mm: f64| {
+                let (sin, cos) = (-arc_mm / radius_mm).sin_cos();
+                let outwards = Vec3::new(cos, sin, 0.0);
+                RunStation {
+                    point: radius_mm * outwards,
+                    tangent: Vec3::new(sin, -cos, 0.0),
+                    n: outwards,
+                    s: Vec3::Z,
+                    theta: 0.0,
+                    depth: 1.0,
+                    arc_mm,
+                    size_mm: 2.5,
+                    clearance_mm: 0.12,
+                    shape: RunShape::Seam,
+                }
+            };
+            let run = Run {
+                male: PatchId(0),
+                female: PatchId(1),
+                stations: vec![at(0.0), at(0.5)],
+            };
+            if cross(&params, &run.stations[0], &run.stations[1]) {
+                continue;
+            }
+            n_accepted += 1;
+            let corners = |t: f64| {
+                let at = run.station_at(t);
+                Section::at(&params, &at).bounds().corners(&at)
+            };
+            let chord = run.stations[1].point - run.stations[0].point;
+            for i in 0..10 {
+                let [from, to] = [i, i + 1].map(|i| corners(0.1 * f64::from(i)));
+                let advances = from.iter().zip(to).all(|(a, b)| (b - *a).dot(chord) > 0.0);
+                assert!(advances, "radius {radius_mm} mm, step {i}");
+            }
+        }
+        assert!(n_accepted > 30 && n_accepted < 80, "{n_accepted}");
     }
 }

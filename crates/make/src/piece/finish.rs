@@ -24,8 +24,8 @@ use crate::connector::{ConnectorParams, Run, contacts};
 /// Greatest distance of a finished piece's surface from the one made, mm: far below what a printer resolves.
 const NEAR_MM: f64 = 0.01;
 /// Greatest such distance at folds, mm. Where two cuts meet at a small angle, a notch remains that is thinner
-/// than a hair.
-const AT_FOLDS_MM: f64 = 0.05;
+/// than a hair and up to a tenth of a millimetre deep.
+const AT_FOLDS_MM: f64 = 0.12;
 /// Depth below the model's surface up to which a piece's points stay in place, mm: it is seen.
 const VISIBLE_MM: f64 = 0.3;
 /// Distance of ribs from the rim, mm.
