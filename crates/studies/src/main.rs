@@ -20,6 +20,7 @@ mod savings;
 mod search;
 mod segmentations;
 mod sheet;
+mod sides;
 mod speed;
 mod statistics;
 mod strength;

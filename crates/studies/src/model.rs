@@ -7,14 +7,16 @@ use std::sync::atomic::AtomicBool;
 use clap::{Args, ValueEnum};
 use shellock::ParamProblem;
 use shellock::Progress;
-use shellock::design::{Params, Settings};
+use shellock::connector::ConnectorParams;
+use shellock::design::{Params, Settings, Thickness};
 use shellock::plan::{PlanSurvey, survey};
-use shellock::segmentation::segment;
-use shellock::sizes;
+use shellock::segmentation::{Method, segment};
+use shellock::sizes::{self, SizeChoice, SizeRange};
 use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
 use shellock_formats::{read_labels, read_mesh};
 use shellock_geom::Solid;
 use shellock_geom::check::into_solid;
+use shellock_print::Printer;
 
 use crate::failure::Failure;
 
@@ -57,6 +59,14 @@ impl ModelOptions {
         params
     }
 
+    /// Parameters with which the command line makes a kit for the printer `sla`, divided by `auto`.
+    pub fn kit_params(&self) -> Params {
+        let mut params = made_params();
+        (params.seed, params.up) = (self.seed, self.params().up);
+        params.method = Method::Auto;
+        params
+    }
+
     /// Name of the model in titles and folders.
     pub fn name(&self) -> String {
         self.model
@@ -81,6 +91,25 @@ pub struct Divided {
     pub sizes: ConnectorSizes,
     /// Survey of the pieces for planning.
     pub survey: PlanSurvey,
+}
+
+/// Parameters with which the command line makes kits for the printer `sla`, except for the division.
+pub fn made_params() -> Params {
+    let printer = Printer::sla();
+    let mut params = Params::default();
+    params.thickness = Thickness::Auto;
+    // The work of ten seconds, as the command line counts it.
+    params.proof_budget = 200_000;
+    params.material = printer.material;
+    params.seam_gap_mm = printer.tolerance_mm;
+    params.connector = ConnectorParams {
+        size: SizeChoice::Auto(SizeRange::default()),
+        clearance_mm: printer.clearance_mm,
+        key_clearance_mm: printer.key_clearance_mm,
+        min_wall_mm: printer.min_wall_mm,
+        ..ConnectorParams::default()
+    };
+    params
 }
 
 /// Parses a whole number from 1 on.

@@ -12,7 +12,7 @@ mod kit;
 mod mechanics;
 mod print;
 mod repair;
-mod sheet;
+pub mod sheet;
 
 use std::cell::OnceCell;
 use std::fs;

@@ -17,6 +17,7 @@ use crate::convergence::{Runs, convergence_sheets, runs};
 use crate::failure::Failure;
 use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
 use crate::sheet::{Sheet, write_all};
+use crate::sides;
 use crate::table::{Table, markdown};
 
 /// Model, divisions of it, and runs of the search.
@@ -33,6 +34,9 @@ pub struct SegmentationsOptions {
     /// Work of each run: costs of pieces asked for, and plans looked at
     #[arg(long, default_value_t = 30_000, value_parser = at_least_one)]
     evaluations: usize,
+    /// Draw only the sheet of the division as drawn, refined and made, from four sides
+    #[arg(long)]
+    only_sides: bool,
 }
 
 /// One division of the model, or the reason why there is none.
@@ -69,7 +73,12 @@ pub fn run(options: &SegmentationsOptions, out: &Path) -> Result<Vec<PathBuf>, F
     let model = load(&options.model)?;
     let name = options.model.name();
     with_ctx(|ctx| {
-        let (mut rows, mut sheets) = (Vec::new(), Vec::new());
+        let study = format!("{name}/segmentations");
+        let sides = ("sides.svg".to_owned(), sides::sheet(ctx, &options.model, &model)?);
+        let (mut rows, mut sheets) = (Vec::new(), vec![sides]);
+        if options.only_sides {
+            return write_all(out, &study, &sheets);
+        }
         for asked in std::iter::once(None).chain(options.pieces.iter().copied().map(Some)) {
             let of_number: Vec<Row> = Method::ALL
                 .into_iter()
@@ -81,7 +90,7 @@ pub fn run(options: &SegmentationsOptions, out: &Path) -> Result<Vec<PathBuf>, F
         sheets.push(("methods.csv".to_owned(), table(&rows).to_csv()));
         let cells: Vec<Vec<String>> = rows.iter().map(cells).collect();
         sheets.push(("methods.md".to_owned(), markdown(&HEAD, &cells)));
-        write_all(out, &format!("{name}/segmentations"), &sheets)
+        write_all(out, &study, &sheets)
     })
 }
 

@@ -3,19 +3,16 @@
 use std::path::PathBuf;
 
 use rayon::prelude::*;
-use shellock::connector::ConnectorParams;
-use shellock::design::{Params, Settings, Thickness};
+use shellock::design::{Params, Settings};
 use shellock::figure::{self, Figure};
 use shellock::segmentation::Method;
-use shellock::sizes::{SizeChoice, SizeRange};
 use shellock::{Design, DesignOutcome, PatchId, design};
 use shellock_geom::{Solid, TriMesh, Vec3};
-use shellock_print::Printer;
 use shellock_render::stills::{Painted, crease_normals};
 use shellock_render::{ReportPiece, palette};
 
 use crate::failure::Failure;
-use crate::model::with_ctx;
+use crate::model::{made_params, with_ctx};
 
 /// Size of the figure, mm, and number of triangles along it, as in `shellock demo`.
 const SIZE_MM: f64 = 150.0;
@@ -23,25 +20,6 @@ const CELLS: f64 = 94.0;
 
 /// Number of pieces in `shellock demo`.
 const OF_DEMO: usize = 7;
-
-/// Parameters of `shellock demo`, except for the division.
-fn params() -> Params {
-    let printer = Printer::sla();
-    let mut params = Params::default();
-    params.thickness = Thickness::Auto;
-    // The work of ten seconds, as the command line counts it.
-    params.proof_budget = 200_000;
-    params.material = printer.material;
-    params.seam_gap_mm = printer.tolerance_mm;
-    params.connector = ConnectorParams {
-        size: SizeChoice::Auto(SizeRange::default()),
-        clearance_mm: printer.clearance_mm,
-        key_clearance_mm: printer.key_clearance_mm,
-        min_wall_mm: printer.min_wall_mm,
-        ..ConnectorParams::default()
-    };
-    params
-}
 
 /// A finished kit with its pieces in place.
 pub struct Kit {
@@ -58,7 +36,7 @@ pub struct Kit {
 impl Kit {
     /// Makes the squirrel of `shellock demo`: cut where a person would cut, into few pieces.
     pub fn of_demo() -> Result<Self, Failure> {
-        let mut params = params();
+        let mut params = made_params();
         params.method = Method::Auto;
         params.n_pieces = Some(OF_DEMO);
         Self::make(&params)
@@ -66,7 +44,7 @@ impl Kit {
 
     /// Makes a squirrel with pieces of similar size and joints of all kinds, for close-ups.
     pub fn squirrel() -> Result<Self, Failure> {
-        Self::make(&params())
+        Self::make(&made_params())
     }
 
     fn make(params: &Params) -> Result<Self, Failure> {
