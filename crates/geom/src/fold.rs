@@ -13,7 +13,7 @@ use crate::{TriMesh, Vec3};
 const LEAST_MM2: f64 = 0.01;
 /// Distance from a face at which there must be air, mm.
 const IN_FRONT_MM: f64 = 2e-3;
-/// Factor by which limits are stricter before rounding, which moves points by up to 0.02 µm.
+/// Factor by which limits are stricter before rounding, which moves points by less than 0.1 µm.
 const ROUNDING_MARGIN: f64 = 1.1;
 /// Directions of the rays, turned to the side that the face looks at. All of them must meet material: one ray
 /// may pass through an edge.

@@ -22,7 +22,7 @@ const VIEWS: [&str; 4] = ["front", "left", "back", "right"];
 /// One stage of a division.
 struct Stage {
     name: &'static str,
-    /// Reason why there is no such division, or words on it.
+    /// Number of pieces and share of the smallest.
     words: String,
     mesh: TriMesh,
     /// Piece of each triangle of `mesh`.
@@ -44,6 +44,9 @@ pub fn sheet(ctx: &Ctx<'_>, options: &ModelOptions, model: &Model) -> Result<Str
     for (row, stage) in stages.iter().enumerate() {
         let top = LINE + row as f64 * (STILL + LINE);
         sheet.words([8.0, top + 16.0], &format!("{}: {}", stage.name, stage.words));
+        if stage.piece_of_face.is_empty() {
+            continue;
+        }
         let of_piece = colors.of(stage);
         let face_colors: Vec<[u8; 3]> = stage.piece_of_face.iter().map(|&piece| of_piece[piece]).collect();
         let normals = crease_normals(&stage.mesh);
@@ -94,7 +97,12 @@ fn stages(ctx: &Ctx<'_>, options: &ModelOptions, model: &Model) -> Result<Vec<St
         patches(&refined.patch_of_face),
     ));
     match design(ctx, &params, solid, labels).map_err(|e| fault(e.to_string()))? {
-        DesignOutcome::NoPlan(none) => eprintln!("no kit: {}", none.reason),
+        DesignOutcome::NoPlan(none) => stages.push(Stage {
+            name: "no kit can be made",
+            words: none.reason,
+            mesh: TriMesh::default(),
+            piece_of_face: Vec::new(),
+        }),
         DesignOutcome::Made(made) => {
             let words = match made.kit.verification.has_passed() {
                 true => String::new(),

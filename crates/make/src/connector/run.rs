@@ -363,20 +363,25 @@ fn thin_out(params: &ConnectorParams, stations: &[RunStation]) -> Vec<RunStation
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_run_narrows_gently_past_an_obstacle_and_breaks_off_where_no_size_has_room() {
-        let at = |i: i32| RunStation {
-            point: f64::from(i) * Vec3::X,
-            tangent: Vec3::X,
-            n: Vec3::Y,
+    /// A station whose piece leaves along z.
+    fn station(point: Vec3, tangent: Vec3, n: Vec3, [arc_mm, size_mm]: [f64; 2]) -> RunStation {
+        RunStation {
+            point,
+            tangent,
+            n,
             s: Vec3::Z,
             theta: 0.0,
             depth: 1.0,
-            arc_mm: f64::from(i),
-            size_mm: 4.0,
+            arc_mm,
+            size_mm,
             clearance_mm: 0.12,
             shape: RunShape::Seam,
-        };
+        }
+    }
+
+    #[test]
+    fn a_run_narrows_gently_past_an_obstacle_and_breaks_off_where_no_size_has_room() {
+        let at = |i: i32| station(f64::from(i) * Vec3::X, Vec3::X, Vec3::Y, [f64::from(i), 4.0]);
         let mut stations: Vec<RunStation> = (0..=30).map(at).collect();
         let mut allowed = vec![true; 31];
         // Sizes up to 2.5 mm pass the obstacle at 10, none the one at 25.
@@ -404,18 +409,8 @@ mod tests {
             let at = |arc_mm: f64| {
                 let (sin, cos) = (-arc_mm / radius_mm).sin_cos();
                 let outwards = Vec3::new(cos, sin, 0.0);
-                RunStation {
-                    point: radius_mm * outwards,
-                    tangent: Vec3::new(sin, -cos, 0.0),
-                    n: outwards,
-                    s: Vec3::Z,
-                    theta: 0.0,
-                    depth: 1.0,
-                    arc_mm,
-                    size_mm: 2.5,
-                    clearance_mm: 0.12,
-                    shape: RunShape::Seam,
-                }
+                let tangent = Vec3::new(sin, -cos, 0.0);
+                station(radius_mm * outwards, tangent, outwards, [arc_mm, 2.5])
             };
             let run = Run {
                 male: PatchId(0),
