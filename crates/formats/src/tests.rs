@@ -511,6 +511,35 @@ fn labels_are_whole_numbers_from_0() {
 }
 
 #[test]
+fn settings_of_objects_are_written_for_prusaslicer_and_change_no_mesh() {
+    let mesh = tetrahedron();
+    let object = |name, settings| NamedObject {
+        name,
+        color: [0; 3],
+        mesh: &mesh,
+        rotation: None,
+        moved_mm: [0.0; 3],
+        settings,
+    };
+    let bytes = write_3mf(&[object("a", &[]), object("b & c", &[("raft_layers", "2")])]);
+    let mut text = String::new();
+    zip::ZipArchive::new(Cursor::new(&bytes))
+        .unwrap()
+        .by_name("Metadata/Slic3r_PE_model.config")
+        .unwrap()
+        .read_to_string(&mut text)
+        .unwrap();
+    let (first, second) = text.split_once("<object id=\"3\"").unwrap();
+    assert!(!first.contains("raft_layers") && first.contains("<object id=\"2\""));
+    assert!(second.contains("key=\"raft_layers\" value=\"2\"") && second.contains("b &amp; c"));
+    // The slicer makes nothing of triangles outside the range.
+    assert_eq!(text.matches("firstid=\"0\" lastid=\"3\"").count(), 2);
+    let read = |bytes: &[u8]| read_mesh(bytes, None).unwrap().mesh;
+    let plain = write_3mf(&[object("a", &[]), object("b & c", &[])]);
+    assert_eq!(read(&bytes), read(&plain));
+}
+
+#[test]
 fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     let mesh = tetrahedron();
     // Maps x to y, and y to −x.
@@ -522,6 +551,7 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
             mesh: &mesh,
             rotation: None,
             moved_mm: [0.0; 3],
+            settings: &[],
         },
         NamedObject {
             name: "Kopf ä",
@@ -529,6 +559,7 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
             mesh: &mesh,
             rotation: Some(quarter),
             moved_mm: [10.0, 0.5, -3.0],
+            settings: &[],
         },
     ];
     let bytes = write_3mf(&objects);

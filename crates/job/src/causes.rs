@@ -20,6 +20,8 @@ pub enum Cause {
         /// Name and size of the printer.
         printer: String,
     },
+    /// Some pieces of filament stand on too little to stay on the plate by themselves.
+    RaftNeeded,
     /// No font has some letters of the model's name.
     LettersNotPrinted {
         /// The letters that are missing.
@@ -51,6 +53,16 @@ impl Diagnostic for Cause {
                 ),
             )
             .by(&["pieces", "printer"]),
+            Self::RaftNeeded => Told::warning(
+                "raft-needed",
+                format!(
+                    "{} {} on too little of the plate and would fall over while printing: PrusaSlicer gives \
+                     {} a raft of two layers; in another slicer, turn it on",
+                    named(pieces),
+                    plural(pieces.len(), "stands", "stand"),
+                    plural(pieces.len(), "it", "them"),
+                ),
+            ),
             Self::LettersNotPrinted { letters } => {
                 Told::warning("letters-not-printed", unprintable_letters(letters))
             }
@@ -87,6 +99,7 @@ mod tests {
             Cause::PieceTooLarge {
                 printer: "\"fdm\" (256 × 256 × 256 mm)".into(),
             },
+            Cause::RaftNeeded,
             Cause::LettersNotPrinted {
                 letters: "兔".repeat(255),
             },

@@ -336,6 +336,7 @@ fn assembly(design: &Design) -> Vec<u8> {
             mesh,
             rotation: None,
             moved_mm: [0.0; 3],
+            settings: &[],
         })
         .collect();
     write_3mf(&objects)

@@ -13,6 +13,7 @@ use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
 use shellock_render::stills::{Camera, Painted, render};
+use shellock_report::words::pieces as named;
 
 use crate::causes::Cause;
 
@@ -21,6 +22,9 @@ const SEEN: f64 = 3e-4;
 
 /// Colour of the plate in pictures.
 const BED: [u8; 3] = [226, 228, 232];
+
+/// Settings of PrusaSlicer for a piece on a raft. The supports stand on it, too.
+const RAFT: [(&str, &str); 2] = [("raft_layers", "2"), ("support_material", "1")];
 
 /// A kit laid on plates.
 pub struct Printing {
@@ -80,18 +84,23 @@ impl Printing {
         self.grams
     }
 
-    /// Warns of pieces that are too large for the printer; `None` if all fit.
-    pub fn warnings(&self) -> Option<Warning> {
-        let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| i.into()).collect();
-        (!pieces.is_empty()).then(|| {
-            Warning::new(
-                Cause::PieceTooLarge {
-                    printer: describe(&self.printer),
-                },
-                pieces,
-                None,
-            )
-        })
+    /// Warns of pieces that are too large for the printer, and of those that need a raft.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let printer = describe(&self.printer);
+        let too_large = self.plates.too_large.iter().map(|&i| i.into()).collect();
+        let of =
+            |cause, pieces: Vec<PatchId>| (!pieces.is_empty()).then(|| Warning::new(cause, pieces, None));
+        let all = [
+            of(Cause::PieceTooLarge { printer }, too_large),
+            of(Cause::RaftNeeded, self.on_rafts()),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
+    /// Pieces that need a raft, in order.
+    fn on_rafts(&self) -> Vec<PatchId> {
+        let laid = self.plates.poses.iter().filter(|l| l.needs_raft);
+        laid.map(|l| l.piece.into()).collect()
     }
 
     /// Describes the plates in one line for people.
@@ -161,6 +170,10 @@ impl Printing {
             let supports = format!("{:.1} cm² of the outer surface", outer_mm2 / 100.0);
             figures.push(("supports touch".to_owned(), supports));
         }
+        let on_rafts = self.on_rafts();
+        if !on_rafts.is_empty() {
+            figures.push(("on a raft".to_owned(), named(&on_rafts)));
+        }
         figures
     }
 
@@ -227,6 +240,7 @@ impl Printing {
                 mesh,
                 rotation: Some(laid.axes),
                 moved_mm,
+                settings: if laid.needs_raft { &RAFT } else { &[] },
             }
         };
         let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {

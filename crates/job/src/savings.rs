@@ -234,6 +234,7 @@ impl Slicer {
             mesh: solid.mesh(),
             rotation: Some(laid.axes),
             moved_mm: laid.moved_mm,
+            settings: &[],
         };
         let is_single = files.len() == 1;
         let is_plate = |name: &str| is_single || name.starts_with("plates/");

@@ -50,8 +50,10 @@ fn settings(printer: &Printer) -> Vec<String> {
                 "Layer height {layer} mm. Use at least 3 walls, so that thin walls and connectors print \
                  solid. Infill makes little difference."
             ),
-            "Turn on supports, from the build plate only, with enough gap to come off cleanly. Do not use a \
-             brim. Turn on elephant foot compensation, so that the first layer does not bulge at seams."
+            "Turn on supports, with enough gap to come off cleanly. Pieces that stand on a thin edge have a \
+             raft of two layers in PrusaSlicer; in another slicer, turn the raft on for them. Do not use a \
+             brim for the others. Turn on elephant foot compensation, so that the first layer does not bulge \
+             at seams."
                 .into(),
         ],
         Process::Sls => [

@@ -3,6 +3,7 @@
 //! Each piece is oriented so that its outer skin needs the least support (`orient`), then the plates are
 //! packed (`pack`). Plates lie side by side, so that one file can hold all of them.
 
+mod foothold;
 mod orient;
 mod pack;
 
@@ -82,6 +83,10 @@ pub struct Laid {
     pub outer_support_mm2: f64,
     /// Area of all surface that needs support, mm².
     pub support_mm2: f64,
+    /// Area of the first layer of a filament print, mm²; `None` for other processes.
+    pub foothold_mm2: Option<f64>,
+    /// True if a filament print needs a raft: its first layer is too small, or not below its centre of mass.
+    pub needs_raft: bool,
     /// Printing load in this pose.
     pub load: Load,
 }
@@ -307,6 +312,8 @@ fn place(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
         size_mm: pose.bounds.size().to_array(),
         outer_support_mm2: pose.support.outer_mm2,
         support_mm2: pose.support.all_mm2,
+        foothold_mm2: pose.foothold.map(|foothold| foothold.area_mm2),
+        needs_raft: pose.foothold.is_some_and(|foothold| !foothold.is_enough()),
         load: pose.load,
     }
 }

@@ -186,6 +186,7 @@ fn object(mesh: &TriMesh, turned: [[f64; 3]; 3], moved_mm: [f64; 3]) -> NamedObj
         mesh,
         rotation: Some(turned),
         moved_mm,
+        settings: &[],
     }
 }
 

@@ -133,6 +133,7 @@ impl<'a> Plate<'a> {
                 mesh: &part.mesh,
                 rotation: Some(part.axes),
                 moved_mm: part.moved_mm,
+                settings: &[],
             })
             .collect();
         write_3mf(&objects)

@@ -22,6 +22,8 @@ pub struct NamedObject<'a> {
     pub rotation: Option<[[f64; 3]; 3]>,
     /// Translation after the rotation, mm.
     pub moved_mm: [f64; 3],
+    /// Settings of PrusaSlicer for this object, by their names in its configuration files.
+    pub settings: &'a [(&'static str, &'static str)],
 }
 
 const TITLE: &str = "Shellock pieces";
@@ -34,15 +36,21 @@ const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>
 "#;
 const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
-<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
-"#;
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>"#;
+/// Content type of settings files.
+const SETTINGS_TYPE: &str = r#"<Default Extension="config" ContentType="text/xml"/>"#;
+/// Place of PrusaSlicer's settings in the archive.
+const SETTINGS: &str = "Metadata/Slic3r_PE_model.config";
+/// Id of the resource with the colours; objects follow it.
+const MATERIALS_ID: usize = 1;
 
 /// Writes a 3MF model with one build item per object, in millimetres. Deterministic: equal objects give equal
 /// bytes on every platform.
 ///
 /// Coordinates are rounded to `f32`, as slicers read them. Slicers reject objects without triangles.
 pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
-    package(&model_xml(objects))
+    let has_settings = objects.iter().any(|object| !object.settings.is_empty());
+    package(&model_xml(objects), has_settings.then(|| settings_xml(objects)))
 }
 
 /// Writes a 3MF of one body in millimetres with painted triangles: colour k, from 1 to 16, is the k-th
@@ -63,11 +71,11 @@ pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> 
     );
     add_mesh(&mut xml, mesh, Some(colors));
     xml.push_str("</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n");
-    package(&xml)
+    package(&xml, None)
 }
 
-/// Packs a model into an archive.
-fn package(model: &str) -> Vec<u8> {
+/// Packs a model into an archive, with settings of its objects if there are any.
+fn package(model: &str, settings: Option<String>) -> Vec<u8> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(1))
@@ -75,14 +83,18 @@ fn package(model: &str) -> Vec<u8> {
         .unix_permissions(0o644)
         .system(System::Unix)
         .large_file(model.len() >= u32::MAX as usize);
+    let settings_type = settings.as_ref().map_or("", |_| SETTINGS_TYPE);
+    let types = format!("{CONTENT_TYPES}{settings_type}</Types>\n");
     let entries = [
-        ("3D/3dmodel.model", model),
-        ("[Content_Types].xml", CONTENT_TYPES),
-        ("_rels/.rels", RELATIONS),
+        ("3D/3dmodel.model", Some(model)),
+        ("[Content_Types].xml", Some(&types)),
+        ("_rels/.rels", Some(RELATIONS)),
+        (SETTINGS, settings.as_deref()),
     ];
 
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (path, text) in entries {
+        let Some(text) = text else { continue };
         archive
             .start_file(path, options)
             .expect("fixed and distinct paths are accepted");
@@ -105,10 +117,6 @@ fn head(title: &str, namespace: &str, metadata: &str) -> String {
 }
 
 fn model_xml(objects: &[NamedObject]) -> String {
-    /// Id of the resource with the colours; objects follow it.
-    const MATERIALS_ID: usize = 1;
-    let object_id = |i: usize| MATERIALS_ID + 1 + i;
-
     let mut xml = head(TITLE, "", "");
     if !objects.is_empty() {
         add(&mut xml, format_args!("<basematerials id=\"{MATERIALS_ID}\">\n"));
@@ -152,6 +160,43 @@ fn model_xml(objects: &[NamedObject]) -> String {
         xml.push_str("/>\n");
     }
     xml.push_str("</build>\n</model>\n");
+    xml
+}
+
+fn object_id(i: usize) -> usize {
+    MATERIALS_ID + 1 + i
+}
+
+/// Settings of all objects. PrusaSlicer drops an object that is listed here without the range of its
+/// triangles.
+fn settings_xml(objects: &[NamedObject]) -> String {
+    let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<config>\n");
+    for (i, object) in objects.iter().enumerate() {
+        let (id, name) = (object_id(i), Escaped(object.name));
+        let last = object.mesh.triangles.len().saturating_sub(1);
+        add(
+            &mut xml,
+            format_args!(
+                "<object id=\"{id}\" instances_count=\"1\">\n\
+                 <metadata type=\"object\" key=\"name\" value=\"{name}\"/>\n"
+            ),
+        );
+        for (key, value) in object.settings {
+            add(
+                &mut xml,
+                format_args!("<metadata type=\"object\" key=\"{key}\" value=\"{value}\"/>\n"),
+            );
+        }
+        add(
+            &mut xml,
+            format_args!(
+                "<volume firstid=\"0\" lastid=\"{last}\">\n\
+                 <metadata type=\"volume\" key=\"name\" value=\"{name}\"/>\n\
+                 <metadata type=\"volume\" key=\"volume_type\" value=\"ModelPart\"/>\n</volume>\n</object>\n"
+            ),
+        );
+    }
+    xml.push_str("</config>\n");
     xml
 }
 

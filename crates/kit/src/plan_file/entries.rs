@@ -290,6 +290,12 @@ pub struct LaidEntry {
     pub support_mm2: f64,
     /// Area of outer skin that needs support, mm².
     pub outer_support_mm2: f64,
+    /// Area of the first layer of a filament print, mm²; `None` for other processes.
+    #[serde(default)]
+    pub foothold_mm2: Option<f64>,
+    /// True if a filament print needs a raft.
+    #[serde(default)]
+    pub raft: bool,
 }
 
 /// Print time and material, including supports.

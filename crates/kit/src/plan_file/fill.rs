@@ -298,6 +298,8 @@ impl PrintingEntry {
             moved: l.moved_mm,
             support_mm2: l.support_mm2,
             outer_support_mm2: l.outer_support_mm2,
+            foothold_mm2: l.foothold_mm2,
+            raft: l.needs_raft,
         });
         let (pieces_s, solid_s) = (cost.seconds, whole.map_or(0.0, |w| w.seconds));
         let ratio = pieces_s / solid_s.max(f64::MIN_POSITIVE);

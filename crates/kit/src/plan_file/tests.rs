@@ -51,7 +51,8 @@ const WHOLE: &str = r#"{
     "warnings": [{ "code": "key-ribs", "severity": "warning", "message": "file them", "pieces": [2], "at": null }],
     "printing": { "printer": "sla", "process": "sla", "bed": [192.0, 120.0, 200.0], "layer": 0.05, "plates": 1,
         "laid": [{ "piece": 1, "plate": 1, "size": [20.0, 20.0, 5.0], "turned": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0],
-            [0.0, 0.0, 1.0]], "moved": [4.0, 4.0, 0.0], "support_mm2": 10.5, "outer_support_mm2": 0.5 }],
+            [0.0, 0.0, 1.0]], "moved": [4.0, 4.0, 0.0], "support_mm2": 10.5, "outer_support_mm2": 0.5,
+            "foothold_mm2": 70.5, "raft": false }],
         "too_large": [2], "time": { "by": "closed form", "pieces_s": 3600.5, "solid_s": 0.0, "ratio": null,
             "pieces_g": 104.5, "solid_g": 84.5, "solid_as": "hollowed to 2 mm walls" } }
 }"#;

@@ -8,6 +8,7 @@
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
+use super::foothold::Foothold;
 use super::{Printable, Skin};
 use crate::columns::Columns;
 use crate::load::{Load, Supports};
@@ -50,6 +51,8 @@ pub(super) struct Pose {
     /// Bounding box of the piece in these axes.
     pub bounds: Aabb,
     pub support: Support,
+    /// First layer of a filament print; `None` for other processes.
+    pub foothold: Option<Foothold>,
     pub load: Load,
 }
 
@@ -71,6 +74,7 @@ impl Pose {
             axes: [-y, x, z],
             bounds,
             support: self.support,
+            foothold: self.foothold,
             load: self.load,
         }
     }
@@ -95,14 +99,17 @@ struct Prices {
     cup_s: f64,
     /// Price of a mm² of the largest slice, which is peeled off.
     peel_s: f64,
-    /// Price of a pose that is not stable.
+    /// Price of a pose that is not stable, even with its supports.
     falling_s: f64,
+    /// Price of a pose in which the piece needs a raft: the raft and its removal.
+    raft_s: f64,
 }
 
 /// Prices of somebody who prints by `process`. In resin, skin matters most, as supports leave pits. In
 /// filament, a cm² of marks costs five minutes: at three minutes, a teddy's kit took 8 % less time, and 35
 /// cm² of its skin were marked instead of 10. A gram of filament costs two minutes, less than half of the
-/// time to print it.
+/// time to print it. A raft costs ten minutes: it takes a hundredth of the time to print, and it must be
+/// peeled off.
 fn prices(process: Process) -> Prices {
     match process {
         Process::Sla => Prices {
@@ -111,6 +118,7 @@ fn prices(process: Process) -> Prices {
             cup_s: 0.5,
             peel_s: 0.3,
             falling_s: 0.0,
+            raft_s: 0.0,
         },
         Process::Fdm => Prices {
             gram_s: 120.0,
@@ -118,6 +126,7 @@ fn prices(process: Process) -> Prices {
             cup_s: 0.0,
             peel_s: 0.0,
             falling_s: 3600.0,
+            raft_s: 600.0,
         },
         Process::Sls => Prices {
             gram_s: 0.0,
@@ -125,6 +134,7 @@ fn prices(process: Process) -> Prices {
             cup_s: 0.0,
             peel_s: 0.0,
             falling_s: 0.0,
+            raft_s: 0.0,
         },
     }
 }
@@ -170,11 +180,11 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
     let turn = judged
         .chain(unjudged)
         .find_map(|up| body.best_turn(up, room_mm))?;
-    Some(pose(printer, piece, turn))
+    Some(pose(printer, piece, &body, turn))
 }
 
 /// Measures the piece, with all its triangles, in the pose that was found.
-fn pose(printer: &Printer, piece: &Printable<'_>, (axes, bounds): (Axes, Aabb)) -> Pose {
+fn pose(printer: &Printer, piece: &Printable<'_>, body: &Body<'_>, (axes, bounds): (Axes, Aabb)) -> Pose {
     let (mesh, up) = (piece.mesh, axes[2]);
     let overhangs = (0..mesh.triangles.len()).filter(|&f| -mesh.face_normal(f).dot(up) >= COS_OVERHANG);
     let faces: Vec<Face> = overhangs.map(|f| Face::of(mesh, f, &piece.skin, 0.0)).collect();
@@ -183,6 +193,7 @@ fn pose(printer: &Printer, piece: &Printable<'_>, (axes, bounds): (Axes, Aabb)) 
         axes,
         bounds,
         support: support(&faces, bounds.min.z, up),
+        foothold: (printer.process == Process::Fdm).then(|| body.foothold(printer, up)),
         load: Load::of(mesh, [x, y, up], printer),
     }
 }
@@ -212,12 +223,14 @@ fn nearby(up: Vec3) -> Vec<Vec3> {
 }
 
 /// Axes of the plate in the frame of the piece.
-type Axes = [Vec3; 3];
+pub(super) type Axes = [Vec3; 3];
 
 /// Properties of a piece that decide its orientation.
 struct Body<'a> {
     hull: TriMesh,
     center: Vec3,
+    /// The piece with all its triangles.
+    exact: &'a TriMesh,
     /// The simple mesh, and its faces.
     mesh: &'a TriMesh,
     faces: Vec<Face>,
@@ -253,6 +266,7 @@ impl<'a> Body<'a> {
         Some(Self {
             hull,
             center: center_of_mass(mesh),
+            exact: piece.mesh,
             mesh,
             faces: (0..mesh.triangles.len()).map(face).collect(),
         })
@@ -302,7 +316,7 @@ impl<'a> Body<'a> {
                 ..Load::default()
             };
             let mark_s = prices.mark_s * self.support(up).outer_mm2;
-            (seconds(printer, &load) + mark_s, up)
+            (seconds(printer, &load) + mark_s + self.raft_s(printer, up), up)
         };
         let mut all: Vec<(f64, Vec3)> = self.directions().into_par_iter().map(least).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -328,13 +342,34 @@ impl<'a> Body<'a> {
         if prices.falling_s > 0.0 && !self.stands(&columns, [x, y], printer.layer_mm) {
             cost_s += prices.falling_s;
         }
+        cost_s += self.raft_s(printer, up);
         Judged { cost_s, up }
+    }
+
+    /// Price of a pose in which a filament print needs a raft.
+    fn raft_s(&self, printer: &Printer, up: Vec3) -> f64 {
+        let raft_s = prices(printer.process).raft_s;
+        if raft_s > 0.0 && !self.foothold(printer, up).is_enough() {
+            raft_s
+        } else {
+            0.0
+        }
+    }
+
+    fn foothold(&self, printer: &Printer, up: Vec3) -> Foothold {
+        let (x, y) = up.any_orthonormal_pair();
+        let layer = [self.lowest_mm(up), printer.layer_mm];
+        Foothold::of(self.exact, [x, y, up], layer, self.center)
+    }
+
+    fn lowest_mm(&self, up: Vec3) -> f64 {
+        let heights = self.hull.points.iter().map(|p| p.dot(up));
+        heights.fold(f64::INFINITY, f64::min)
     }
 
     /// Areas that need support with `up` as the vertical.
     fn support(&self, up: Vec3) -> Support {
-        let heights = self.hull.points.iter().map(|p| p.dot(up));
-        support(&self.faces, heights.fold(f64::INFINITY, f64::min), up)
+        support(&self.faces, self.lowest_mm(up), up)
     }
 
     /// Returns true if the centre of mass is above the foot and the supports on the plate, with a margin.
