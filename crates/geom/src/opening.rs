@@ -6,6 +6,10 @@
 //! Voxels are bits: a row along x is a sequence of words, and erosion is a conjunction of shifted rows.
 //! Layers are swept in z, and only as many are held as the ball is high, so memory follows the surface.
 
+mod neck;
+
+pub use neck::Neck;
+
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -28,6 +32,8 @@ pub struct HangingPart {
     pub core_mm3: f64,
     /// Mean position of that volume, mm.
     pub at: Vec3,
+    /// Joint with the rest; `None` if part or neck are so large that it is not measured.
+    pub neck: Option<Neck>,
 }
 
 /// Finds the parts of a closed mesh that hang on bridges thinner than a ball, largest first; without the
@@ -63,7 +69,11 @@ pub fn hanging_parts(
         let with_largest = parts.home(largest, &whole);
         hanging.retain(|&(id, _)| parts.home(id, &whole) == with_largest);
     }
-    hanging.into_iter().map(|(_, part)| part).collect()
+    let measured = hanging.into_iter().map(|(id, part)| HangingPart {
+        neck: Neck::of(mesh, &parts, id, radius),
+        ..part
+    });
+    measured.collect()
 }
 
 /// Positions of the voxels.
@@ -311,6 +321,7 @@ impl Parts {
         HangingPart {
             core_mm3: n * self.grid.voxel_mm.powi(3),
             at: self.grid.centre(sum / n),
+            neck: None,
         }
     }
 

@@ -36,6 +36,9 @@ pub struct Printing {
     /// laid.
     cost: Cost,
     whole: Option<Cost>,
+    /// Both costs on a fast printer, if the process has several paces.
+    fast: Option<Cost>,
+    fast_whole: Option<Cost>,
     /// Mass of the pieces without supports, g.
     grams: f64,
 }
@@ -57,18 +60,18 @@ impl Printing {
         for laid in &plates.poses {
             loads[laid.plate] = loads[laid.plate].and(laid.load);
         }
-        let whole = lay_alone(printer, solid.mesh()).map(|laid| {
-            let load = whole(printer.process, laid.load, solid.mesh().area());
-            Cost::of(printer, &load)
-        });
+        let whole = lay_alone(printer, solid.mesh())
+            .map(|laid| whole(printer.process, laid.load, solid.mesh().area()));
+        let costs = loads.iter().map(|load| Cost::of(printer, load));
+        let fast = loads.iter().filter_map(|load| Cost::of_fast(printer, load));
         Self {
             printer: printer.clone(),
             plates,
             simple,
-            cost: loads
-                .iter()
-                .fold(Cost::default(), |sum, load| sum.and(Cost::of(printer, load))),
-            whole,
+            cost: costs.fold(Cost::default(), Cost::and),
+            fast: Cost::of_fast(printer, &Load::default()).map(|nothing| fast.fold(nothing, Cost::and)),
+            whole: whole.map(|load| Cost::of(printer, &load)),
+            fast_whole: whole.and_then(|load| Cost::of_fast(printer, &load)),
             grams: pieces.iter().map(TriMesh::signed_volume).sum::<f64>() * printer.material.density_g_cm3
                 / 1000.0,
         }
@@ -134,14 +137,32 @@ impl Printing {
         } else {
             " with supports"
         };
-        let ours = format!("about {} on this printer{supports}", self.cost.words());
+        let on = |fast: &Option<Cost>| match fast {
+            Some(fast) => format!(", or {} on a fast printer", fast.words()),
+            None => String::new(),
+        };
+        let printer = self.printer_words();
+        let ours = format!(
+            "about {} on {printer}{supports}{}",
+            self.cost.words(),
+            on(&self.fast)
+        );
         match self.whole {
             Some(whole) => format!(
-                "{ours}; the whole model {} takes {}",
+                "{ours}; the whole model {} takes {}{}",
                 whole_words(process),
-                whole.words()
+                whole.words(),
+                on(&self.fast_whole)
             ),
             None => ours,
+        }
+    }
+
+    /// Printer that the time is estimated for.
+    fn printer_words(&self) -> &'static str {
+        match self.printer.process {
+            Process::Fdm => "a printer like the Prusa MK3S",
+            Process::Sla | Process::Sls => "this printer",
         }
     }
 
@@ -159,6 +180,13 @@ impl Printing {
             ("plates".to_owned(), n.to_string()),
             ("all plates, estimated".to_owned(), self.cost.words()),
         ];
+        if let Some(fast) = self.fast {
+            figures[2].0 = format!("all plates on {}, estimated", self.printer_words());
+            figures.push((
+                "all plates on a fast printer, estimated".to_owned(),
+                fast.time_words(),
+            ));
+        }
         if let Some(whole) = self.whole {
             let name = format!(
                 "for comparison, the whole model {}",

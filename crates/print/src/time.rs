@@ -5,16 +5,18 @@
 //! one, faded over ten. This is PrusaSlicer's own formula; a print that was compared differs by 0.02 %. A
 //! print that needs supports is lifted off a pad as a whole.
 //!
-//! Filament: the features are short loops, dense and sparse fill, top surfaces, and for supports their
-//! volume, outlines and solid top layers. The reference is PrusaSlicer with its default print settings, two
-//! perimeters, 15 % infill and supports wherever it sees fit. `cargo xtask study hours` slices pieces and
-//! fits the coefficients. Limits: the coefficients are those of curved shells and of whole models in layers
-//! of 0.2 mm. Large flat faces take less time than predicted (a table top of 40 mm on supports by two fifths,
-//! a cube by a sixth). A small piece alone takes more, as the slicer waits for layers to cool.
+//! Filament: the features are all outlines, short loops, solid and sparse fill, and for supports their
+//! volume, outlines and solid top layers. The references are PrusaSlicer's profile "0.20mm SPEED" for the
+//! MK3S and a plain profile with the speeds of fast printers ([`Pace`]). Both have two perimeters, 15 %
+//! infill and supports wherever the slicer sees fit. `cargo xtask study hours` slices pieces and fits the
+//! coefficients.
+//! Limits: layers of 0.2 mm, curved shells and whole models. Boxes take less than estimated (a cube of 40 mm
+//! by three tenths), since long straight lines reach their full speed. A small piece alone takes more, as the
+//! slicer waits for layers to cool.
 //!
 //! Powder: height alone counts, as every layer is spread alike.
 
-use crate::load::Load;
+use crate::load::{Load, SOLID_LAYERS};
 use crate::printer::{Printer, Process};
 
 /// Times of the steps of a resin layer, and extra exposure of the first layer, seconds.
@@ -33,23 +35,40 @@ const RESIN_MM3: [f64; 2] = [2.9, 0.1];
 /// Wall thickness to which people hollow resin models, mm.
 const HOLLOWED_MM: f64 = 2.0;
 
+/// Speed of a filament printer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// Prints outlines at 35 and 60 mm/s, as a Prusa MK3S does.
+    Usual,
+    /// Prints outlines at 200 and 300 mm/s and accelerates by 10 m/s².
+    Fast,
+}
+
 /// Names of the features that filament print time is linear in.
-pub const TIME_FEATURES: [&str; 7] = [
+pub const TIME_FEATURES: [&str; 8] = [
+    "outlines",
     "short loops",
-    "dense",
+    "fill",
+    "floors",
     "sparse",
-    "top",
     "supports",
     "support sides",
     "support tops",
 ];
-/// Seconds per unit of each feature: mm of a short loop; mm² of a dense layer, of a sparse one; mm² of top
-/// surface as seen from above; mm² of supports in a layer, mm of their outline; mm² of their upper ends.
+/// Width of an outline with its perimeters, mm.
+const OUTLINE_MM: f64 = 0.9;
+/// Seconds per unit of each feature, at the usual and at a fast pace: mm of all outlines; mm of a short loop;
+/// mm² of a solid layer within the perimeters of walls, of floors; mm² of a sparse layer; mm² of supports in
+/// a layer, mm of their outline; mm² of their upper ends. Narrow fill within walls takes far longer than a
+/// floor, whose price is that of a line's width and speed.
 ///
-/// Least squares over 94 prints in layers of 0.2 mm, 80 of single pieces of seven kits and 14 of their whole
-/// models, each sliced with and without supports by PrusaSlicer 2.5. Without supports the time is off by 4 %
-/// in the median and by at most 10 % in nine of ten; supports by 2 % and 7 % of the whole time.
-const TIME_S: [f64; 7] = [0.107, 0.0664, 0.00586, 0.453, 0.0038, 0.0457, 0.604];
+/// Least squares over 82 prints by PrusaSlicer 2.5: 37 pieces of four kits and their whole models, in the
+/// pose on the plate and in a slanted one. A single print is off by 10 % in the median at the usual pace and
+/// by 7 % at the fast one; nine of ten are within 18 and 15 %. Two other kits: -11 and -10 %, -12 and -4 %.
+const TIME_S: [[f64; 8]; 2] = [
+    [0.0852, 0.0794, 0.1222, 0.0278, 0.0077, 0.0030, 0.0663, 0.8516],
+    [0.0332, 0.0220, 0.0383, 0.0095, 0.0059, 0.0011, 0.0201, 0.4635],
+];
 
 /// Names of the features that filament material is linear in.
 pub const PLASTIC_FEATURES: [&str; 6] = [
@@ -60,18 +79,26 @@ pub const PLASTIC_FEATURES: [&str; 6] = [
     "support sides",
     "support tops",
 ];
-/// Plastic in mm³ per unit of each feature: mm³ of dense fill, of sparse fill; mm² of top surface as seen
-/// from above; mm³ of supports, mm² of their sides, of their upper ends. Fitted to the prints of `TIME_S`:
-/// off by 2 % in the median and 6 % in nine of ten, with supports and without.
-const PLASTIC_MM3: [f64; 6] = [0.836, 0.163, 0.688, 0.121, 0.473, 1.17];
+/// Plastic in mm³ per unit of each feature, by the profiles of the usual and of a fast pace: mm³ of dense
+/// fill, of sparse fill; mm² of top surface as seen from above; mm³ of supports, mm² of their sides, of their
+/// upper ends. Fitted to the prints of `TIME_S`: off by 4 % in the median and 13 % in nine of ten.
+const PLASTIC_MM3: [[f64; 6]; 2] = [
+    [0.7725, 0.1857, 1.5625, 0.1116, 0.3786, 0.0],
+    [0.8962, 0.1663, 1.5826, 0.1374, 0.5252, 0.3148],
+];
 
 /// Amounts of [`TIME_FEATURES`] in layers of `layer_mm`.
-pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 7] {
+pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 8] {
+    let (outlines_mm, dense_mm3) = (load.side_mm2 / layer_mm, load.volume_mm3 - load.sparse_mm3);
+    let fill_mm2 = (dense_mm3 / layer_mm - OUTLINE_MM * outlines_mm).max(0.0);
+    // Each level top has a level bottom below it.
+    let floors_mm2 = fill_mm2.min(2.0 * SOLID_LAYERS * load.level_mm2);
     [
+        outlines_mm,
         load.small_side_mm2 / layer_mm,
-        (load.volume_mm3 - load.sparse_mm3).max(0.0) / layer_mm,
+        fill_mm2 - floors_mm2,
+        floors_mm2,
         load.sparse_mm3 / layer_mm,
-        load.top_mm2,
         load.wide_support_mm3 / layer_mm,
         load.wide_side_mm2 / layer_mm,
         load.wide_top_mm2,
@@ -116,6 +143,14 @@ impl Cost {
         }
     }
 
+    /// Estimates the cost of one plate on a fast printer; `None` if the process has one pace only.
+    pub fn of_fast(printer: &Printer, load: &Load) -> Option<Self> {
+        (printer.process == Process::Fdm).then(|| Self {
+            seconds: filament_seconds(printer, load, Pace::Fast),
+            grams: in_grams(printer, filament_mm3(load, Pace::Fast)),
+        })
+    }
+
     /// Cost of two prints, one after the other.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
@@ -127,14 +162,18 @@ impl Cost {
 
     /// Formats the cost as in "13 h 50 min and 104 g".
     pub fn words(self) -> String {
+        format!("{} and {:.0} g", self.time_words(), self.grams)
+    }
+
+    /// Formats the time as in "13 h 50 min".
+    pub fn time_words(self) -> String {
         // The estimate is no more exact than five minutes.
         let minutes = 5 * (self.seconds / 300.0).round() as u64;
-        let time = match (minutes / 60, minutes % 60) {
+        match (minutes / 60, minutes % 60) {
             (0, minutes) => format!("{minutes} min"),
             (hours, 0) => format!("{hours} h"),
             (hours, minutes) => format!("{hours} h {minutes} min"),
-        };
-        format!("{time} and {:.0} g", self.grams)
+        }
     }
 }
 
@@ -178,9 +217,14 @@ fn seconds_above(printer: &Printer, load: &Load, lifted_mm: f64) -> f64 {
     }
     match printer.process {
         Process::Sla => n_layers * (TILT_S + EXPOSURE_S + LIFT_S) + 13.0 * LONGER_S - 56.0 * LONGER_S / 11.0,
-        Process::Fdm => product(time_features(load, printer.layer_mm), TIME_S),
+        Process::Fdm => filament_seconds(printer, load, Pace::Usual),
         Process::Sls => n_layers * POWDER_S,
     }
+}
+
+/// Estimated time that a filament printer takes for a load at a pace, s.
+fn filament_seconds(printer: &Printer, load: &Load, pace: Pace) -> f64 {
+    product(time_features(load, printer.layer_mm), TIME_S[pace as usize])
 }
 
 /// Estimated material that `printer` uses for a load, including supports, g. Powder that is not sintered is
@@ -188,9 +232,18 @@ fn seconds_above(printer: &Printer, load: &Load, lifted_mm: f64) -> f64 {
 pub fn grams(printer: &Printer, load: &Load) -> f64 {
     let mm3 = match printer.process {
         Process::Sla => load.volume_mm3 + product([load.shadow_mm2, load.support_mm3], RESIN_MM3),
-        Process::Fdm => product(plastic_features(load), PLASTIC_MM3),
+        Process::Fdm => filament_mm3(load, Pace::Usual),
         Process::Sls => load.volume_mm3,
     };
+    in_grams(printer, mm3)
+}
+
+/// Estimated plastic of a filament print by the profile of a pace, mm³.
+fn filament_mm3(load: &Load, pace: Pace) -> f64 {
+    product(plastic_features(load), PLASTIC_MM3[pace as usize])
+}
+
+fn in_grams(printer: &Printer, mm3: f64) -> f64 {
     mm3 * printer.material.density_g_cm3 / 1000.0
 }
 
@@ -214,6 +267,20 @@ mod tests {
         assert!((seconds(&fdm, &load.and(load)) / seconds(&fdm, &load) - 2.0).abs() < 1e-12);
         assert_eq!(seconds(&fdm, &Load::default()), 0.0);
         assert!((grams(&fdm, &load.and(load)) / grams(&fdm, &load) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_fast_printer_is_faster_and_only_filament_has_two_paces() {
+        let load = Load {
+            height_mm: 20.0,
+            volume_mm3: 2e4,
+            side_mm2: 1e4,
+            ..Load::default()
+        };
+        let fdm = Printer::fdm();
+        let fast = Cost::of_fast(&fdm, &load).unwrap();
+        assert!(fast.seconds < 0.6 * seconds(&fdm, &load));
+        assert_eq!(Cost::of_fast(&Printer::sla(), &load), None);
     }
 
     #[test]

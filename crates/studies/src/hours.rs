@@ -2,9 +2,10 @@
 //! that fit best.
 //!
 //! Kits are compared plate by plate, and so are their whole models. With `--pieces` every piece is sliced
-//! alone in three poses, with and without supports, and the coefficients of `print::time` are found by least
-//! squares.
+//! alone in two poses, with supports, and the coefficients of `print::time` are found by least squares.
+//! `--profile` names files of settings, such as those of a vendor, in PrusaSlicer's own form.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -16,20 +17,29 @@ use shellock_geom::weld::weld;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::load::Load;
-use shellock_print::plates::{Laid, Printable, Skin, lay, lay_alone};
+use shellock_print::plates::{Laid, Plates, Printable, Skin, lay, lay_alone};
 use shellock_print::time::{Cost, PLASTIC_FEATURES, TIME_FEATURES, plastic_features, time_features};
 
 use crate::failure::Failure;
 use crate::sheet::write_all;
 use crate::table::markdown;
 
-// Number of a form's features that belong to the piece itself; the rest belong to its supports.
-const N_OWN_TIME: usize = 4;
-const N_OWN_PLASTIC: usize = 3;
-/// Settings that differ from PrusaSlicer's defaults; the bed holds everything.
-const SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nskirts = 0\nperimeters = \
-                        2\nfill_density = 15%\nlayer_height = 0.2\nfirst_layer_height = 0.2\nbed_shape = \
-                        0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
+/// Settings of every print; the bed holds everything.
+const SETTINGS: [(&str, &str); 8] = [
+    ("printer_technology", "FFF"),
+    ("nozzle_diameter", "0.4"),
+    ("skirts", "0"),
+    ("fill_density", "15%"),
+    ("layer_height", "0.2"),
+    ("first_layer_height", "0.2"),
+    ("bed_shape", "0x0,1000x0,1000x1000,0x1000"),
+    ("max_print_height", "1000"),
+];
+/// Setting of every print without a profile.
+const WITHOUT_PROFILE: (&str, &str) = ("perimeters", "2");
+/// Settings of pieces that are sliced alone: the slicer would wait for their small layers to cool, which it
+/// need not on a full plate.
+const ALONE: (&str, &str) = ("cooling", "0");
 
 /// Which kits, and what of them.
 #[derive(Args)]
@@ -40,25 +50,63 @@ pub struct HoursOptions {
     /// Slice the pieces alone and find coefficients, instead of comparing kits
     #[arg(long)]
     pieces: bool,
+    /// Settings of a printer, in PrusaSlicer's form; its defaults with two perimeters otherwise
+    #[arg(long, value_name = "FILE")]
+    profile: Vec<PathBuf>,
+    /// Compare with the estimate for fast printers
+    #[arg(long)]
+    fast: bool,
 }
 
 /// Writes the table; returns the file.
 pub fn run(options: &HoursOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let slicer = Slicer {
-        folder: out.join("hours"),
-    };
-    fs::create_dir_all(&slicer.folder).map_err(|source| Failure::File {
-        path: slicer.folder.clone(),
+    let folder = out.join("hours");
+    fs::create_dir_all(&folder).map_err(|source| Failure::File {
+        path: folder.clone(),
         source,
     })?;
+    let own: Vec<Option<&PathBuf>> = options.profile.iter().map(Some).collect();
+    let profiles = if own.is_empty() { vec![None] } else { own };
+    let slicer = |(i, profile)| {
+        Ok(Slicer {
+            folder: folder.clone(),
+            number: i + 1,
+            settings: settings(profile, options.pieces)?,
+        })
+    };
+    let slicers: Vec<Slicer> = profiles
+        .into_iter()
+        .enumerate()
+        .map(slicer)
+        .collect::<Result<_, Failure>>()?;
     let text = if options.pieces {
-        coefficients(&slicer, &options.kits)?
+        coefficients(&slicers, &options.kits)?
     } else {
-        kits(&slicer, &options.kits)?
+        kits(&slicers[0], &options.kits, options.fast)?
     };
     print!("{text}");
     let name = if options.pieces { "pieces.md" } else { "kits.md" };
     write_all(out, "hours", &[(name.to_owned(), text)])
+}
+
+/// Settings of the slicer from a profile, without the one that says whether there are supports.
+fn settings(profile: Option<&PathBuf>, is_alone: bool) -> Result<BTreeMap<String, String>, Failure> {
+    let own = |(key, value): (&str, &str)| (key.trim().to_owned(), value.trim().to_owned());
+    let mut all = BTreeMap::from([WITHOUT_PROFILE].map(own));
+    if let Some(path) = profile {
+        let text = fs::read_to_string(path).map_err(|source| Failure::File {
+            path: path.clone(),
+            source,
+        })?;
+        all = text
+            .lines()
+            .filter_map(|line| line.split_once('='))
+            .map(own)
+            .collect();
+    }
+    all.extend(SETTINGS.into_iter().chain(is_alone.then_some(ALONE)).map(own));
+    all.remove("support_material");
+    Ok(all)
 }
 
 /// Pieces of a kit, and its whole model.
@@ -68,6 +116,17 @@ struct Kit {
 }
 
 impl Kit {
+    fn lay(&self, printer: &Printer) -> Plates {
+        let skin = TriangleBvh::new(&self.whole);
+        let printable = |mesh| Printable {
+            mesh,
+            simple: mesh,
+            skin: Skin::On(&skin),
+        };
+        let printables: Vec<Printable<'_>> = self.pieces.iter().map(printable).collect();
+        lay(printer, &printables)
+    }
+
     fn read(folder: &Path) -> Result<Self, Failure> {
         let file = |path: PathBuf| {
             let bytes = fs::read(&path).map_err(|source| Failure::File {
@@ -101,19 +160,16 @@ impl Kit {
 }
 
 /// One row for each kit: estimate and slicer, and the slicer's ratio of the kit to its whole model.
-fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
+fn kits(slicer: &Slicer, folders: &[PathBuf], is_fast: bool) -> Result<String, Failure> {
     let printer = Printer::fdm();
+    let estimate = |load: &Load| match Cost::of_fast(&printer, load) {
+        Some(cost) if is_fast => cost,
+        _ => Cost::of(&printer, load),
+    };
     let mut rows = Vec::new();
     for folder in folders {
         let kit = Kit::read(folder)?;
-        let skin = TriangleBvh::new(&kit.whole);
-        let printable = |mesh| Printable {
-            mesh,
-            simple: mesh,
-            skin: Skin::On(&skin),
-        };
-        let printables: Vec<Printable<'_>> = kit.pieces.iter().map(printable).collect();
-        let plates = lay(&printer, &printables);
+        let plates = kit.lay(&printer);
         let (mut told, mut ours) = (Cost::default(), Cost::default());
         for plate in 0..plates.n_plates {
             let laid: Vec<&Laid> = plates.poses.iter().filter(|l| l.plate == plate).collect();
@@ -122,20 +178,16 @@ fn kits(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
                 .map(|l| object(&kit.pieces[l.piece], l.axes, l.moved_mm))
                 .collect::<Vec<_>>();
             let load = laid.iter().fold(Load::default(), |sum, l| sum.and(l.load));
-            ours = ours.and(Cost::of(&printer, &load));
-            told = told.and(slicer.cost(&printer, &objects, true)?);
+            ours = ours.and(estimate(&load));
+            told = told.and(slicer.cost(&printer, &objects)?);
         }
         let alone = lay_alone(&printer, &kit.whole).ok_or_else(|| Failure::Model {
             path: folder.clone(),
             problem: "the whole model cannot be laid".into(),
         })?;
-        let whole = slicer.cost(&printer, &[object(&kit.whole, alone.axes, alone.moved_mm)], true)?;
+        let whole = slicer.cost(&printer, &[object(&kit.whole, alone.axes, alone.moved_mm)])?;
         let marks_mm2: f64 = plates.poses.iter().map(|l| l.outer_support_mm2).sum();
-        let row = row(
-            folder,
-            [told, ours, whole, Cost::of(&printer, &alone.load)],
-            marks_mm2,
-        );
+        let row = row(folder, [told, ours, whole, estimate(&alone.load)], marks_mm2);
         eprintln!("{}", row.join(" | "));
         rows.push(row);
     }
@@ -190,89 +242,35 @@ fn object(mesh: &TriMesh, turned: [[f64; 3]; 3], moved_mm: [f64; 3]) -> NamedObj
     }
 }
 
-/// Costs of one print by the slicer, without and with supports, and the amounts that the closed forms use.
+/// Cost of one print by the slicer, and the amounts that the closed forms use.
 struct Sample {
     load: Load,
-    without: Cost,
-    with: Cost,
+    told: Cost,
 }
 
-/// Fits coefficients for the piece itself and for its supports, and reports their errors.
-fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure> {
+/// Fits the coefficients of time and of plastic for each profile, and reports their errors.
+fn coefficients(slicers: &[Slicer], folders: &[PathBuf]) -> Result<String, Failure> {
     let printer = Printer::fdm();
-    let mut samples = Vec::new();
-    for folder in folders {
-        let kit = Kit::read(folder)?;
-        for mesh in kit.pieces.iter().chain([&kit.whole]) {
-            for up in [Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, 0.8, -0.36)] {
-                let (x, y) = up.any_orthonormal_pair();
-                let axes = [x, y, up];
-                let turned = [0, 1, 2].map(|axis| axes.map(|row| row[axis]));
-                let least = |axis: Vec3| {
-                    mesh.points
-                        .iter()
-                        .map(|p| p.dot(axis))
-                        .fold(f64::INFINITY, f64::min)
-                };
-                let print = [object(
-                    mesh,
-                    turned,
-                    [100.0 - least(x), 100.0 - least(y), -least(up)],
-                )];
-                // A print that touches the bed in one point only has no first layer, and the slicer refuses
-                // it.
-                if let (Ok(with), Ok(without)) = (
-                    slicer.cost(&printer, &print, true),
-                    slicer.cost(&printer, &print, false),
-                ) {
-                    samples.push(Sample {
-                        load: Load::of(mesh, axes, &printer),
-                        without,
-                        with,
-                    });
-                }
-            }
-        }
-    }
     let density = printer.material.density_g_cm3 / 1000.0;
-    let time = |s: &Sample| time_features(&s.load, printer.layer_mm).to_vec();
-    let plastic = |s: &Sample| plastic_features(&s.load).to_vec();
-    let (own_time, own_plastic) = (N_OWN_TIME, N_OWN_PLASTIC);
     let mut rows = Vec::new();
-    for (names, own, amounts, told) in [
-        (
-            &TIME_FEATURES[..],
-            own_time,
-            &time as &dyn Fn(&Sample) -> Vec<f64>,
-            &(|c: Cost| c.seconds) as &dyn Fn(Cost) -> f64,
-        ),
-        (
-            &PLASTIC_FEATURES[..],
-            own_plastic,
-            &plastic,
-            &(|c: Cost| c.grams / density),
-        ),
-    ] {
-        for range in [0..own, own..names.len()] {
-            let is_own = range.start == 0;
-            let fitted: Vec<Fitted> = samples
-                .iter()
-                .map(|s| {
-                    let (with, without) = (told(s.with), told(s.without));
-                    let (total, of) = if is_own {
-                        (without, without)
-                    } else {
-                        (with - without, with)
-                    };
-                    Fitted {
-                        amounts: amounts(s)[range.clone()].to_vec(),
-                        total,
-                        of,
-                    }
-                })
-                .collect();
-            rows.push(fit_row(&names[range], &fitted));
-        }
+    for slicer in slicers {
+        let samples = samples(slicer, &printer, folders)?;
+        let fitted: Vec<Fitted> = samples
+            .iter()
+            .map(|s| Fitted {
+                amounts: time_features(&s.load, printer.layer_mm).to_vec(),
+                total: s.told.seconds,
+            })
+            .collect();
+        rows.push(fit_row(&TIME_FEATURES, &fitted));
+        let fitted: Vec<Fitted> = samples
+            .iter()
+            .map(|s| Fitted {
+                amounts: plastic_features(&s.load).to_vec(),
+                total: s.told.grams / density,
+            })
+            .collect();
+        rows.push(fit_row(&PLASTIC_FEATURES, &fitted));
     }
     Ok(markdown(
         &["coefficients", "prints", "median error", "90 % within"],
@@ -280,18 +278,68 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
     ))
 }
 
-/// One equation of the fit; errors count as shares of `of`.
+/// Slices all pieces and whole models alone, in two poses: the one on the plate, and a slanted one.
+fn samples(slicer: &Slicer, printer: &Printer, folders: &[PathBuf]) -> Result<Vec<Sample>, Failure> {
+    let slanted = Vec3::new(0.6, 0.0, 0.8);
+    let mut samples = Vec::new();
+    for folder in folders {
+        let kit = Kit::read(folder)?;
+        let laid = kit.lay(printer).poses.into_iter();
+        let of_pieces = laid.map(|l| {
+            (
+                &kit.pieces[l.piece],
+                Vec3::from_array(l.axes.map(|image| image[2])),
+            )
+        });
+        let of_whole = lay_alone(printer, &kit.whole).map(|l| (&kit.whole, l.axes.map(|image| image[2])));
+        let poses = of_pieces.chain(of_whole.map(|(mesh, up)| (mesh, Vec3::from_array(up))));
+        for (mesh, up) in poses.flat_map(|(mesh, up)| [(mesh, up), (mesh, slanted)]) {
+            let (x, y) = up.any_orthonormal_pair();
+            let axes = [x, y, up];
+            let turned = [0, 1, 2].map(|axis| axes.map(|row| row[axis]));
+            let least = |axis: Vec3| {
+                let along = mesh.points.iter().map(|p| p.dot(axis));
+                along.fold(f64::INFINITY, f64::min)
+            };
+            let moved_mm = [100.0 - least(x), 100.0 - least(y), -least(up)];
+            // A print that touches the bed in one point only has no first layer, and the slicer refuses it.
+            if let Ok(told) = slicer.cost(printer, &[object(mesh, turned, moved_mm)]) {
+                let load = Load::of(mesh, axes, printer);
+                samples.push(Sample { load, told });
+            }
+        }
+    }
+    write_samples(slicer, printer, &samples)?;
+    Ok(samples)
+}
+
+/// Writes amounts and costs of all samples as a table for other programs.
+fn write_samples(slicer: &Slicer, printer: &Printer, samples: &[Sample]) -> Result<(), Failure> {
+    let columns = TIME_FEATURES.iter().chain(&PLASTIC_FEATURES);
+    let mut text = columns.map(|name| format!("{name},")).collect::<String>() + "s,g\n";
+    for s in samples {
+        let time = time_features(&s.load, printer.layer_mm);
+        let plastic = plastic_features(&s.load);
+        for amount in time.iter().chain(&plastic) {
+            text += &format!("{amount:.4},");
+        }
+        text += &format!("{:.1},{:.3}\n", s.told.seconds, s.told.grams);
+    }
+    let path = slicer.folder.join(format!("samples-{}.csv", slicer.number));
+    fs::write(&path, text).map_err(|source| Failure::File { path, source })
+}
+
+/// One equation of the fit; errors count as shares of `total`.
 struct Fitted {
     amounts: Vec<f64>,
     total: f64,
-    of: f64,
 }
 
 fn fit_row(names: &[&str], fitted: &[Fitted]) -> Vec<String> {
     let prices = least_squares(fitted);
     let mut errors: Vec<f64> = fitted
         .iter()
-        .map(|f| (estimate(f, &prices) - f.total).abs() / f.of)
+        .map(|f| (estimate(f, &prices) - f.total).abs() / f.total)
         .collect();
     errors.sort_by(f64::total_cmp);
     let at = |share: f64| {
@@ -320,7 +368,8 @@ fn least_squares(fitted: &[Fitted]) -> Vec<f64> {
     /// Number of rounds: prices converge within some hundred.
     const ROUNDS: usize = 20_000;
     let n = fitted.first().map_or(0, |f| f.amounts.len());
-    let sum = |term: &dyn Fn(&Fitted) -> f64| fitted.iter().map(|f| term(f) / (f.of * f.of)).sum::<f64>();
+    let sum =
+        |term: &dyn Fn(&Fitted) -> f64| fitted.iter().map(|f| term(f) / (f.total * f.total)).sum::<f64>();
     let products: Vec<Vec<f64>> = (0..n)
         .map(|i| (0..n).map(|j| sum(&|f| f.amounts[i] * f.amounts[j])).collect())
         .collect();
@@ -340,13 +389,21 @@ fn least_squares(fitted: &[Fitted]) -> Vec<f64> {
 /// PrusaSlicer, and a folder for its files.
 struct Slicer {
     folder: PathBuf,
+    /// Number of the profile, from 1.
+    number: usize,
+    /// Settings of every print, by their names.
+    settings: BTreeMap<String, String>,
 }
 
 impl Slicer {
-    /// Slices a print and reads the slicer's estimate of its cost.
-    fn cost(&self, printer: &Printer, objects: &[NamedObject<'_>], supports: bool) -> Result<Cost, Failure> {
+    /// Slices a print with supports and reads the slicer's estimate of its cost.
+    fn cost(&self, printer: &Printer, objects: &[NamedObject<'_>]) -> Result<Cost, Failure> {
         let [model, settings, out] = ["job.3mf", "job.ini", "job.gcode"].map(|name| self.folder.join(name));
-        let text = format!("{SETTINGS}support_material = {}\n", u8::from(supports));
+        let lines = self
+            .settings
+            .iter()
+            .map(|(key, value)| format!("{key} = {value}\n"));
+        let text = lines.chain(["support_material = 1\n".into()]).collect::<String>();
         for (path, bytes) in [(&model, write_3mf(objects)), (&settings, text.into_bytes())] {
             fs::write(path, bytes).map_err(|source| Failure::File {
                 path: path.clone(),
@@ -414,7 +471,6 @@ mod tests {
         let made = |a: f64, b: f64| Fitted {
             amounts: vec![a, b, a * b],
             total: 2.0 * a + 0.5 * b,
-            of: 1.0,
         };
         let fitted = [made(1.0, 2.0), made(3.0, 1.0), made(2.0, 5.0), made(4.0, 4.0)];
         let prices = least_squares(&fitted);
@@ -425,7 +481,6 @@ mod tests {
         let falling = [1.0, 2.0].map(|a| Fitted {
             amounts: vec![a],
             total: -a,
-            of: 1.0,
         });
         assert_eq!(least_squares(&falling), [0.0]);
         assert_eq!(seconds_in("1d 1h 1m 1s"), 90_061.0);

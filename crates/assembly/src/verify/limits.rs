@@ -18,7 +18,8 @@
 //! (1) Joints cut without any gap share 0.07 mm³ by rounding alone. (2) Measured by rays here. (3) Four sigma
 //! of the samples above the outside limit. (4) And more than the roundness of printed
 //! edges. (5) Here alone the outside judge is stricter, if it is asked to be (`--strict`).
-//! (6) Three lines of a nozzle, and less than any wall that is printed by default.
+//! (6) Three lines of a nozzle, and less than any wall that is printed by default. A neck that is long enough
+//! to bear a push does not count: the root of a channel's wall is thin, too, and as long as the channel.
 
 /// Greatest common volume of two pieces that counts as rounding, mm³.
 pub const OVERLAP_MM3: f64 = 0.5;
@@ -37,6 +38,10 @@ pub const HOLD_MM3: f64 = 0.55;
 /// Necks that break: their width, mm, and the greatest volume that may hang on them, without its outermost
 /// layer, mm³. What hangs on a thinner neck may itself be too thin to be seen with the greater width.
 pub const NECKS: [(f64, f64); 2] = [(0.85, 4.5), (1.22, 10.0)];
+/// Push at the far end of a part that the second neck may bear instead, N: that of a finger.
+pub const NECK_PUSH_N: f64 = 20.0;
+/// Strength of the neck's material in that, MPa: resin and PLA.
+pub const NECK_STRENGTH_MPA: f64 = 40.0;
 /// Greatest such width as a share of the mean wall of a piece, for thin walls.
 pub const NECK_WALLS: f64 = 0.75;
 /// Width below which slots within one piece are reported, mm: resin fuses them, and no nozzle leaves them
