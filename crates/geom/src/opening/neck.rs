@@ -17,11 +17,11 @@ const LONGEST: f64 = 8.0;
 /// solid, along the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neck {
-    /// Area of the border, mm²: the sum of its shadows on the coordinate planes. Where the border is oblique,
-    /// the sum is too large by up to 1.7 times.
+    /// Area of the border, mm²: the sum of its shadows on the coordinate planes. Where the border is
+    /// oblique, the sum is too large by up to 1.7 times.
     pub area_mm2: f64,
-    /// Longest way within the part to the border, along the axes, mm. Where the way is oblique, it is too long
-    /// by up to 1.7 times.
+    /// Longest way within the part to the border, along the axes, mm. Where the way is oblique, it is too
+    /// long by up to 1.7 times.
     pub lever_mm: f64,
 }
 
