@@ -175,17 +175,17 @@ impl Printing {
     pub fn figures(&self) -> Vec<(String, String)> {
         let n = self.plates.n_plates;
         let outer_mm2: f64 = self.plates.poses.iter().map(|l| l.outer_support_mm2).sum();
+        let all = match self.fast {
+            Some(_) => format!("all plates on {}, estimated", self.printer_words()),
+            None => "all plates, estimated".to_owned(),
+        };
         let mut figures = vec![
             ("printer".to_owned(), describe(&self.printer)),
             ("plates".to_owned(), n.to_string()),
-            ("all plates, estimated".to_owned(), self.cost.words()),
+            (all, self.cost.words()),
         ];
         if let Some(fast) = self.fast {
-            figures[2].0 = format!("all plates on {}, estimated", self.printer_words());
-            figures.push((
-                "all plates on a fast printer, estimated".to_owned(),
-                fast.time_words(),
-            ));
+            figures.push(("all plates on a fast printer, estimated".to_owned(), fast.words()));
         }
         if let Some(whole) = self.whole {
             let name = format!(

@@ -162,18 +162,14 @@ impl Cost {
 
     /// Formats the cost as in "13 h 50 min and 104 g".
     pub fn words(self) -> String {
-        format!("{} and {:.0} g", self.time_words(), self.grams)
-    }
-
-    /// Formats the time as in "13 h 50 min".
-    pub fn time_words(self) -> String {
         // The estimate is no more exact than five minutes.
         let minutes = 5 * (self.seconds / 300.0).round() as u64;
-        match (minutes / 60, minutes % 60) {
+        let time = match (minutes / 60, minutes % 60) {
             (0, minutes) => format!("{minutes} min"),
             (hours, 0) => format!("{hours} h"),
             (hours, minutes) => format!("{hours} h {minutes} min"),
-        }
+        };
+        format!("{time} and {:.0} g", self.grams)
     }
 }
 
