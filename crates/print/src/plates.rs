@@ -13,14 +13,15 @@ use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::load::Load;
-use crate::printer::Printer;
+use crate::printer::{Printer, Process};
 use orient::Pose;
 use pack::{Spot, pack};
 
 /// Free margin of a plate, mm: room for what slicers add at the foot of a print.
 const EDGE_MM: f64 = 4.0;
-/// Gap between pieces on a plate, mm.
-const GAP_MM: f64 = 3.0;
+/// Gap between pieces on a plate, mm: between prints of filament, whose rafts and supports reach 4 mm beyond
+/// the pieces, and between others.
+const GAPS_MM: [f64; 2] = [8.0, 3.0];
 /// Tolerance of the mesh on which poses of a solid are compared, mm. It has a fifth of the triangles.
 const SIMPLE_MM: f64 = 0.15;
 /// Distance between the left edges of neighbouring plates, in plate widths.
@@ -233,16 +234,17 @@ fn improve(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) ->
 }
 
 fn pack_in_order(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packing {
+    let gap_mm = gap_mm(printer);
     let sides: Vec<[f64; 2]> = order
         .iter()
-        .map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM))
+        .map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + gap_mm))
         .collect();
     let [width, depth, _] = room_mm(printer);
     Packing(
         order
             .iter()
             .copied()
-            .zip(pack([width + GAP_MM, depth + GAP_MM], &sides))
+            .zip(pack([width + gap_mm, depth + gap_mm], &sides))
             .collect(),
     )
 }
@@ -287,6 +289,14 @@ pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
             is_turned: false,
         },
     ))
+}
+
+fn gap_mm(printer: &Printer) -> f64 {
+    let [of_filament, of_others] = GAPS_MM;
+    match printer.process {
+        Process::Fdm => of_filament,
+        Process::Sla | Process::Sls => of_others,
+    }
 }
 
 /// Width, depth and height available for pieces, mm.

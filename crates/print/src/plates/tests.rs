@@ -70,7 +70,7 @@ fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
         );
         for (other, theirs) in plates.poses.iter().zip(&boxes).take(i) {
             assert!(
-                laid.plate != other.plate || !mine.grown(2.9).intersects(*theirs),
+                laid.plate != other.plate || !mine.grown(7.9).intersects(*theirs),
                 "pieces {i} and {}",
                 other.piece
             );
