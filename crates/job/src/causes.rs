@@ -56,7 +56,7 @@ impl Diagnostic for Cause {
             Self::RaftNeeded => Told::warning(
                 "raft-needed",
                 format!(
-                    "{} {} on too little of the plate and would fall over while printing: PrusaSlicer gives \
+                    "{} {} on too little of the plate and may fall over while printing: PrusaSlicer gives \
                      {} a raft of two layers; in another slicer, turn it on",
                     named(pieces),
                     plural(pieces.len(), "stands", "stand"),

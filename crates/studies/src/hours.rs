@@ -50,7 +50,8 @@ pub struct HoursOptions {
     /// Slice the pieces alone and find coefficients, instead of comparing kits
     #[arg(long)]
     pieces: bool,
-    /// Settings of a printer, in PrusaSlicer's form; its defaults with two perimeters otherwise
+    /// Settings of a printer, in PrusaSlicer's form; its defaults with two perimeters otherwise. Several may
+    /// be given with --pieces
     #[arg(long, value_name = "FILE")]
     profile: Vec<PathBuf>,
     /// Compare with the estimate for fast printers
@@ -308,6 +309,12 @@ fn samples(slicer: &Slicer, printer: &Printer, folders: &[PathBuf]) -> Result<Ve
                 samples.push(Sample { load, told });
             }
         }
+    }
+    if samples.is_empty() {
+        return Err(Failure::Program {
+            program: "prusa-slicer".into(),
+            problem: "it refuses every piece".into(),
+        });
     }
     write_samples(slicer, printer, &samples)?;
     Ok(samples)

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use super::{Crossing, Parts, crossings};
 use crate::TriMesh;
 
-/// Greatest number of voxels of a box that is examined, 32 MB.
-const MOST_VOXELS: usize = 1 << 25;
+/// Greatest number of voxels of a box that is examined. Each takes five bytes, 40 MB in all.
+const MOST_VOXELS: usize = 1 << 23;
 /// Length of the longest neck that is measured, in radii of the ball, between the places that its centre
 /// reaches.
 const LONGEST: f64 = 8.0;
@@ -56,7 +56,7 @@ impl Neck {
         let voxel_mm = parts.grid.voxel_mm;
         (!border.is_empty()).then(|| Self {
             area_mm2: border.len() as f64 * voxel_mm * voxel_mm,
-            lever_mm: cells.longest_way(&border) as f64 * voxel_mm,
+            lever_mm: f64::from(cells.longest_way(&border)) * voxel_mm,
         })
     }
 }
@@ -155,8 +155,8 @@ impl Cells {
     }
 
     /// Greatest number of steps within the part from a border.
-    fn longest_way(&self, border: &[usize]) -> usize {
-        const FAR: usize = usize::MAX;
+    fn longest_way(&self, border: &[usize]) -> u32 {
+        const FAR: u32 = u32::MAX;
         let mut steps = vec![FAR; self.owner.len()];
         let mut next: VecDeque<usize> = border.iter().copied().collect();
         border.iter().for_each(|&cell| steps[cell] = 0);

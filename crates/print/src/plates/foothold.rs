@@ -45,7 +45,7 @@ impl Foothold {
             }
         }
         Self {
-            area_mm2: 0.5 * double_mm2.abs(),
+            area_mm2: 0.5 * double_mm2,
             inside_mm: reach_mm.into_iter().fold(f64::INFINITY, f64::min),
         }
     }
@@ -69,9 +69,9 @@ fn crossing(mesh: &TriMesh, t: [u32; 3], h: [f64; 3]) -> Option<[Vec3; 2]> {
     };
     let (next, last) = (on_edge((alone + 1) % 3), on_edge((alone + 2) % 3));
     Some(if is_above[alone] {
-        [last, next]
-    } else {
         [next, last]
+    } else {
+        [last, next]
     })
 }
 
