@@ -134,6 +134,7 @@ impl<'a> Begun<'a> {
         });
         let printing = Printing::of(
             &self.printer,
+            design.settings.body.thickness_mm,
             design.kit.pieces.as_slice(),
             &design.kit.surface.mesh,
             &model.solid,

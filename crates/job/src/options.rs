@@ -209,6 +209,7 @@ impl Options {
         p.material = self.material.unwrap_or(printer.material);
         p.drop_m = self.drop;
         p.seam_gap_mm = self.seam_gap.unwrap_or(printer.tolerance_mm);
+        p.line_overlap_mm = printer.line_overlap_mm();
         p.cell_mm = self.grid;
         p.connector = ConnectorParams {
             size: self.connector,

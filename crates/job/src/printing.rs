@@ -9,6 +9,7 @@ use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::load::Load;
 use shellock_print::plates::{Laid, Plates, Printable, Skin, lay, lay_alone};
+use shellock_print::slicing::Slicing;
 use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
@@ -23,12 +24,13 @@ const SEEN: f64 = 3e-4;
 /// Colour of the plate in pictures.
 const BED: [u8; 3] = [226, 228, 232];
 
-/// Settings of PrusaSlicer for a piece on a raft. The supports stand on it, too.
-const RAFT: [(&str, &str); 2] = [("raft_layers", "2"), ("support_material", "1")];
+/// Setting of PrusaSlicer for a piece on a raft. The supports stand on it, too.
+const RAFT: (&str, &str) = ("raft_layers", "2");
 
 /// A kit laid on plates.
 pub struct Printing {
     printer: Printer,
+    slicing: Slicing,
     plates: Plates,
     /// Pieces with few triangles, as they are shown.
     simple: Vec<TriMesh>,
@@ -44,9 +46,9 @@ pub struct Printing {
 }
 
 impl Printing {
-    /// Lays `pieces` on plates of `printer`. Faces of theirs on `surface` are the visible skin; `solid` is
-    /// the model.
-    pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
+    /// Lays `pieces` with walls of `wall_mm` on plates of `printer`. Faces of theirs on `surface` are the
+    /// visible skin; `solid` is the model.
+    pub fn of(printer: &Printer, wall_mm: f64, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
         let simple = simplify(pieces);
         let skin = TriangleBvh::new(surface);
         let printable = |(mesh, simple)| Printable {
@@ -55,7 +57,8 @@ impl Printing {
             skin: Skin::On(&skin),
         };
         let printables: Vec<Printable<'_>> = pieces.iter().zip(&simple).map(printable).collect();
-        let plates = lay(printer, &printables);
+        let slicing = Slicing::of_pieces(printer, wall_mm);
+        let plates = lay(printer, slicing, &printables);
         let mut loads = vec![Load::default(); plates.n_plates];
         for laid in &plates.poses {
             loads[laid.plate] = loads[laid.plate].and(laid.load);
@@ -66,6 +69,7 @@ impl Printing {
         let fast = loads.iter().filter_map(|load| Cost::of_fast(printer, load));
         Self {
             printer: printer.clone(),
+            slicing,
             plates,
             simple,
             cost: costs.fold(Cost::default(), Cost::and),
@@ -171,6 +175,11 @@ impl Printing {
         &self.printer
     }
 
+    /// Choices that the plates ask of the slicer.
+    pub fn slicing(&self) -> Slicing {
+        self.slicing
+    }
+
     /// Lists the figures of the plates for the page.
     pub fn figures(&self) -> Vec<(String, String)> {
         let n = self.plates.n_plates;
@@ -260,6 +269,8 @@ impl Printing {
         let names: Vec<String> = (1..=pieces.len())
             .map(|number| format!("piece {number}"))
             .collect();
+        let usual = self.slicing.settings();
+        let on_raft = [&usual[..], &[RAFT]].concat();
         let object = |laid: &Laid, moved_mm: [f64; 3]| {
             let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
             NamedObject {
@@ -268,7 +279,7 @@ impl Printing {
                 mesh,
                 rotation: Some(laid.axes),
                 moved_mm,
-                settings: if laid.needs_raft { &RAFT } else { &[] },
+                settings: if laid.needs_raft { &on_raft } else { &usual },
             }
         };
         let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {

@@ -20,7 +20,7 @@ use shellock_print::{Printer, Process};
 
 use crate::failure::Failure;
 use crate::files::{Writing, write};
-use crate::kits::{KitOnDisk, model_of, pieces_of, plan_of};
+use crate::kits::{KitOnDisk, broken, model_of, pieces_of, plan_of};
 use crate::printing::Printing;
 
 /// Name of the file within a kit.
@@ -90,6 +90,7 @@ pub struct SavedTime {
 /// if `closed_form`, even where a slicer is installed.
 pub fn savings(kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<Savings, Failure> {
     let plan = plan_of(kit)?;
+    let wall_mm = plan.thickness_mm().map_err(broken(kit))?;
     let KitOnDisk { pieces, .. } = pieces_of(kit, &plan)?;
     let solid = model_of(kit, &plan, model)?;
     let slicer = if closed_form { None } else { Slicer::find()? };
@@ -97,7 +98,7 @@ pub fn savings(kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<Sa
     for printer in [Printer::sla(), Printer::fdm()] {
         let bed_mm = plan.printing.as_ref().map_or(printer.bed_mm, |p| p.bed);
         let printer = Printer { bed_mm, ..printer };
-        let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
+        let printing = Printing::of(&printer, wall_mm, pieces.as_slice(), solid.mesh(), &solid);
         let sliced = slicer
             .as_ref()
             .map(|slicer| slicer.costs(&printer, printing.files(pieces.as_slice()), &solid));

@@ -4,6 +4,7 @@
 use shellock::PatchId;
 use shellock_kit::plan_file::piece_file;
 use shellock_print::booklet::Section;
+use shellock_print::slicing::Slicing;
 use shellock_print::{Printer, Process};
 use shellock_render::{ReportPart, ReportTab};
 
@@ -15,7 +16,10 @@ pub fn print(printing: &Printing, has_booklet: bool) -> ReportTab {
     let of = pictures.len();
     let mut parts = vec![
         ReportPart::Table("Plates, time and material".into(), printing.figures()),
-        ReportPart::Text("Slicer settings".into(), settings(printing.printer())),
+        ReportPart::Text(
+            "Slicer settings".into(),
+            settings(printing.printer(), printing.slicing()),
+        ),
     ];
     parts.extend(
         pictures
@@ -33,7 +37,7 @@ pub fn print(printing: &Printing, has_booklet: bool) -> ReportTab {
     }
 }
 
-fn settings(printer: &Printer) -> Vec<String> {
+fn settings(printer: &Printer, slicing: Slicing) -> Vec<String> {
     let layer = printer.layer_mm;
     let own = match printer.process {
         Process::Sla => [
@@ -47,13 +51,14 @@ fn settings(printer: &Printer) -> Vec<String> {
         ],
         Process::Fdm => [
             format!(
-                "Layer height {layer} mm. Use at least 3 walls, so that thin walls and connectors print \
-                 solid. Infill makes little difference."
+                "Layer height {layer} mm, with {} perimeters (wall loops), so that walls and connectors print \
+                 solid. Infill makes little difference.",
+                slicing.n_perimeters
             ),
-            "Turn on supports, with enough gap to come off cleanly. Pieces that stand on a thin edge have a \
-             raft of two layers in PrusaSlicer; in another slicer, turn the raft on for them. Do not use a \
-             brim for the others. Turn on elephant foot compensation, so that the first layer does not bulge \
-             at seams."
+            "Supports everywhere, in the style \"snug\", for slopes of up to 40° from level. Pieces that \
+             stand on a thin edge need a raft of two layers; do not use a brim for the others. PrusaSlicer \
+             reads all this and the perimeters from the file; set it yourself in another slicer. Turn on \
+             elephant foot compensation, so that the first layer does not bulge at seams."
                 .into(),
         ],
         Process::Sls => [
@@ -94,7 +99,7 @@ pub fn before(printing: &Printing) -> Vec<Section> {
             .figures()
             .into_iter()
             .map(line)
-            .chain(settings(printer))
+            .chain(settings(printer, printing.slicing()))
             .collect(),
     };
     let of_care = care(printer).parts.into_iter().filter_map(section);
@@ -212,7 +217,7 @@ mod tests {
     #[test]
     fn every_process_is_told_how_to_print_and_clean() {
         for printer in Printer::presets() {
-            assert!(settings(&printer).len() >= 3);
+            assert!(settings(&printer, Slicing::of_pieces(&printer, 2.0)).len() >= 3);
             assert_eq!(care(&printer).parts.len(), 5);
         }
     }

@@ -11,6 +11,8 @@ pub mod load;
 mod pdf;
 pub mod plates;
 pub mod printer;
+pub mod slicing;
+mod supports;
 pub mod time;
 
 pub use plates::{Plates, lay};

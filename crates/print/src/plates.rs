@@ -14,6 +14,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::load::Load;
 use crate::printer::{Printer, Process};
+use crate::slicing::Slicing;
 use orient::Pose;
 use pack::{Spot, pack};
 
@@ -117,13 +118,13 @@ pub struct Plates {
     pub too_large: Vec<usize>,
 }
 
-/// Orients all `pieces` and packs them on plates of `printer`. Deterministic: equal input gives equal plates.
+/// Orients all `pieces`, which are sliced alike, and packs them on plates of `printer`. Deterministic: equal input gives equal plates.
 ///
 /// Takes 0.1 to 0.3 s for a piece of 20 000 triangles: up to 150 poses are judged coarsely, 10 finely.
-pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
+pub fn lay(printer: &Printer, slicing: Slicing, pieces: &[Printable<'_>]) -> Plates {
     let poses: Vec<Option<Pose>> = pieces
         .par_iter()
-        .map(|piece| orient::best(printer, piece, room_mm(printer)))
+        .map(|piece| orient::best(printer, slicing, piece, room_mm(printer)))
         .collect();
     let too_large = (0..pieces.len()).filter(|&i| poses[i].is_none()).collect();
     let fitting: Vec<(usize, Pose)> = poses
@@ -270,8 +271,8 @@ pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
     box_mm.iter().zip(room).all(|(side, room)| *side <= room)
 }
 
-/// Returns the pose of a solid that needs the least support, on a plate of unlimited size. `None` for a mesh
-/// without a convex hull, such as a flat one.
+/// Returns the pose of a whole model that needs the least support, on a plate of unlimited size, with supports
+/// as the slicer's profile draws them. `None` for a mesh without a convex hull, such as a flat one.
 pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
     let simple = decimate(mesh.clone(), &vec![SIMPLE_MM; mesh.points.len()]);
     let piece = Printable {
@@ -279,7 +280,7 @@ pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
         simple: &simple,
         skin: Skin::All,
     };
-    let pose = orient::best(printer, &piece, [f64::INFINITY; 3])?;
+    let pose = orient::best(printer, Slicing::USUAL, &piece, [f64::INFINITY; 3])?;
     Some(place(
         0,
         &pose,

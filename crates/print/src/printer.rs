@@ -109,6 +109,17 @@ impl Printer {
         }
     }
 
+    /// Overlap of neighbouring lines of a wall, mm; 0 for printers that lay no lines.
+    ///
+    /// Slicers take a line as a rectangle with round ends and lay lines so close that their area fills the
+    /// layer: the overlap is (1 − π/4) of the layer's height (Slic3r manual, "Flow math").
+    pub fn line_overlap_mm(&self) -> f64 {
+        match self.process {
+            Process::Fdm => (1.0 - std::f64::consts::FRAC_PI_4) * self.layer_mm,
+            Process::Sla | Process::Sls => 0.0,
+        }
+    }
+
     /// Presets of widespread printers, one per process and material.
     pub fn presets() -> Vec<Self> {
         vec![Self::sla(), Self::fdm(), Self::fdm_petg(), Self::sls()]

@@ -5,13 +5,13 @@
 //! one, faded over ten. This is PrusaSlicer's own formula; a print that was compared differs by 0.02 %. A
 //! print that needs supports is lifted off a pad as a whole.
 //!
-//! Filament: the features are all outlines, short loops, solid and sparse fill, and for supports their
-//! volume, outlines and solid top layers. The references are PrusaSlicer's profile "0.20mm SPEED" for the
-//! MK3S and a plain profile with the speeds of fast printers ([`Pace`]). Both have two perimeters, 15 %
-//! infill and supports wherever the slicer sees fit. `cargo xtask study hours` slices pieces and fits the
+//! Filament: the features are all outlines, perimeters beyond two, short loops, solid and sparse fill, and for
+//! supports their volume, outlines and solid top layers. The references are PrusaSlicer's profile "0.20mm SPEED" for the
+//! MK3S and a plain profile with the speeds of fast printers ([`Pace`]). Both have 15 % infill; perimeters and
+//! supports are those of [`Slicing`](crate::slicing::Slicing). `cargo xtask study hours` slices pieces and fits the
 //! coefficients.
 //! Limits: layers of 0.2 mm, curved shells and whole models. Boxes take less than estimated (a cube of 40 mm
-//! by three tenths), since long straight lines reach their full speed. A small piece alone takes more, as the
+//! by half), since long straight lines reach their full speed. A small piece alone takes more, as the
 //! slicer waits for layers to cool.
 //!
 //! Powder: height alone counts, as every layer is spread alike.
@@ -45,8 +45,9 @@ pub enum Pace {
 }
 
 /// Names of the features that filament print time is linear in.
-pub const TIME_FEATURES: [&str; 8] = [
+pub const TIME_FEATURES: [&str; 9] = [
     "outlines",
+    "more perimeters",
     "short loops",
     "fill",
     "floors",
@@ -55,19 +56,26 @@ pub const TIME_FEATURES: [&str; 8] = [
     "support sides",
     "support tops",
 ];
-/// Width of an outline with its perimeters, mm.
+/// Width of an outline with two perimeters, and of each perimeter more, mm.
 const OUTLINE_MM: f64 = 0.9;
-/// Seconds per unit of each feature, at the usual and at a fast pace: mm of all outlines; mm of a short loop;
+const PERIMETER_MM: f64 = 0.41;
+/// Seconds per unit of each feature, at the usual and at a fast pace: mm of all outlines with two perimeters;
+/// mm of a third and fourth perimeter; mm of a short loop;
 /// mm² of a solid layer within the perimeters of walls, of floors; mm² of a sparse layer; mm² of supports in
 /// a layer, mm of their outline; mm² of their upper ends. Narrow fill within walls takes far longer than a
 /// floor. Floors were not fitted: their price is that of a line's width and speed.
 ///
-/// Least squares over 82 prints by PrusaSlicer 2.5: 37 pieces of four kits and their whole models, in the
-/// pose on the plate and in a slanted one. A single print is off by 10 % in the median at the usual pace and
-/// by 7 % at the fast one; nine of ten are within 18 and 15 %. Two other kits: -11 and -10 %, -12 and -4 %.
-const TIME_S: [[f64; 8]; 2] = [
-    [0.0852, 0.0794, 0.1222, 0.0111, 0.0077, 0.0030, 0.0663, 0.8516],
-    [0.0332, 0.0220, 0.0383, 0.0095, 0.0059, 0.0011, 0.0201, 0.4635],
+/// Least squares over 180 prints by PrusaSlicer 2.5: 82 pieces of seven kits on snug supports, half of them with
+/// two perimeters and half as kits are sliced, and whole models, each in the pose on the plate and in a slanted
+/// one. A single print is off by 6 % in the median at the usual pace and by 5 % at the fast one; nine of ten
+/// are within 18 and 15 %.
+const TIME_S: [[f64; 9]; 2] = [
+    [
+        0.0903, 0.0300, 0.0560, 0.1058, 0.0111, 0.0115, 0.0009, 0.0459, 0.6710,
+    ],
+    [
+        0.0300, 0.0114, 0.0137, 0.0455, 0.0095, 0.0072, 0.0, 0.0206, 0.3605,
+    ],
 ];
 
 /// Names of the features that filament material is linear in.
@@ -81,27 +89,32 @@ pub const PLASTIC_FEATURES: [&str; 6] = [
 ];
 /// Plastic in mm³ per unit of each feature, by the profiles of the usual and of a fast pace: mm³ of dense
 /// fill, of sparse fill; mm² of top surface as seen from above; mm³ of supports, mm² of their sides, of their
-/// upper ends. Fitted to the prints of `TIME_S`: off by 4 % in the median and 13 % in nine of ten.
+/// upper ends. Fitted to the prints of `TIME_S`: off by 3 % in the median and 8 % in nine of ten.
 const PLASTIC_MM3: [[f64; 6]; 2] = [
-    [0.7725, 0.1857, 1.5625, 0.1116, 0.3786, 0.0],
-    [0.8962, 0.1663, 1.5826, 0.1374, 0.5252, 0.3148],
+    [0.8584, 0.2142, 0.8392, 0.1327, 0.1973, 0.0],
+    [0.9092, 0.2118, 0.7558, 0.1434, 0.3512, 0.3332],
 ];
 
 /// Amounts of [`TIME_FEATURES`] in layers of `layer_mm`.
-pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 8] {
+pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 9] {
     let (outlines_mm, dense_mm3) = (load.side_mm2 / layer_mm, load.volume_mm3 - load.sparse_mm3);
-    let fill_mm2 = (dense_mm3 / layer_mm - OUTLINE_MM * outlines_mm).max(0.0);
+    let within_mm2 = (dense_mm3 / layer_mm - OUTLINE_MM * outlines_mm).max(0.0);
+    // Walls have no room for more perimeters than fill them.
+    let more_mm = load.n_perimeters.saturating_sub(2) as f64 * outlines_mm;
+    let more_mm = more_mm.min(within_mm2 / PERIMETER_MM);
+    let fill_mm2 = within_mm2 - PERIMETER_MM * more_mm;
     // Each level top has a level bottom below it.
     let floors_mm2 = fill_mm2.min(2.0 * SOLID_LAYERS * load.level_mm2);
     [
         outlines_mm,
+        more_mm,
         load.small_side_mm2 / layer_mm,
         fill_mm2 - floors_mm2,
         floors_mm2,
         load.sparse_mm3 / layer_mm,
-        load.wide_support_mm3 / layer_mm,
-        load.wide_side_mm2 / layer_mm,
-        load.wide_top_mm2,
+        load.drawn.volume_mm3 / layer_mm,
+        load.drawn.side_mm2 / layer_mm,
+        load.drawn.top_mm2,
     ]
 }
 
@@ -111,9 +124,9 @@ pub fn plastic_features(load: &Load) -> [f64; 6] {
         (load.volume_mm3 - load.sparse_mm3).max(0.0),
         load.sparse_mm3,
         load.top_mm2,
-        load.wide_support_mm3,
-        load.wide_side_mm2,
-        load.wide_top_mm2,
+        load.drawn.volume_mm3,
+        load.drawn.side_mm2,
+        load.drawn.top_mm2,
     ]
 }
 
@@ -246,14 +259,18 @@ fn in_grams(printer: &Printer, mm3: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load::Drawn;
 
     #[test]
     fn resin_and_powder_ask_for_height_alone_and_filament_for_material() {
         let load = Load {
             height_mm: 50.0,
             volume_mm3: 2e4,
-            wide_support_mm3: 1e3,
-            wide_side_mm2: 500.0,
+            drawn: Drawn {
+                volume_mm3: 1e3,
+                side_mm2: 500.0,
+                top_mm2: 0.0,
+            },
             ..Load::default()
         };
         for printer in [Printer::sla(), Printer::sls()] {
@@ -287,9 +304,11 @@ mod tests {
             ..Load::default()
         };
         let held = Load {
-            wide_top_mm2: 100.0,
-            wide_support_mm3: 1e3,
-            wide_side_mm2: 400.0,
+            drawn: Drawn {
+                volume_mm3: 1e3,
+                side_mm2: 400.0,
+                top_mm2: 100.0,
+            },
             ..block
         };
         let sparse = Load {

@@ -56,9 +56,6 @@ const RESOLUTION_MM: f64 = 0.05;
 const MOST_WITHOUT_BRACKET: usize = 4;
 /// Number of thicknesses tried after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless the limits forbid
-/// it: that to which people hollow models. A thicker one would break, too, and weigh more.
-const USUAL_MM: f64 = 2.0;
 /// Points of the coarse mesh, which shows how the stress depends on the thickness.
 const COARSE_POINTS: f64 = 2000.0;
 /// Points of the fine mesh, whose stress counts; docs/notes/strength.md shows the effect of more.
@@ -105,6 +102,9 @@ pub struct StrengthParams {
     /// walls leave a figure of 150 mm little cavity, and where 3 mm are too weak, 10 mm rarely suffice
     /// (docs/notes/strength.md).
     pub most_mm: f64,
+    /// Wall of a model whose stress is too high with every wall, unless the limits forbid it. [0.4, 20]; 2, to
+    /// which people hollow models. A thicker one would break, too, and weigh more.
+    pub usual_mm: f64,
     /// Share of the hollow area whose stress may exceed the decisive one. [0, 0.2]; 0.005.
     pub peak_share: f64,
     /// Factor on the number of points of the analysis mesh. [0.1, 20]; 1.
@@ -122,6 +122,7 @@ impl Default for StrengthParams {
             least_mm: 1.6,
             thin_mm: 1.2,
             most_mm: 3.0,
+            usual_mm: 2.0,
             peak_share: 0.005,
             refinement: 1.0,
         }
@@ -169,6 +170,7 @@ impl StrengthParams {
                 self.least_mm,
             ),
             ParamProblem::unless_within("thickest wall", "mm", self.most_mm, self.least_mm, 20.0),
+            ParamProblem::unless_within("usual wall", "mm", self.usual_mm, 0.4, 20.0),
             ParamProblem::unless_within("share of peaks", "", self.peak_share, 0.0, 0.2),
             ParamProblem::unless_within("refinement", "", self.refinement, 0.1, 20.0),
         ]
@@ -380,47 +382,17 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     let strength_mpa = params.material.strength_mpa;
     let middle_mm = (params.least_mm * params.most_mm).sqrt();
     let mut tried = vec![coarse.worst(middle_mm)?.trial];
-    let mut ratio = USUAL_RATIO;
     let mut exacts: Vec<Fallen> = Vec::new();
-    for _ in 0..MOST_FINE {
-        let estimate = estimate(ctx, params, &coarse, &mut tried, strength_mpa / ratio)?;
-        if exacts
-            .iter()
-            .any(|e| e.trial.thickness_mm == estimate.thickness_mm)
-        {
-            break;
-        }
-        let exact = fine.worst(estimate.thickness_mm)?;
-        let before = ratio;
-        // A wall without any load teaches nothing.
-        if exact.trial.stress_mpa > 0.0 && estimate.stress_mpa > 0.0 {
-            ratio = exact.trial.stress_mpa / estimate.stress_mpa;
-        }
-        exacts.push(exact);
-        if (ratio / before).ln().abs() <= RATIO_TOLERANCE {
-            break;
-        }
-    }
-    // Where the ratio of the meshes varies with the thickness, the thinnest wall of sufficient strength
-    // counts, else the last.
-    let bears = |e: &Fallen| e.trial.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
-    let last = exacts.len() - 1;
-    let thinnest = |i: &usize, j: &usize| {
-        exacts[*i]
-            .trial
-            .thickness_mm
-            .total_cmp(&exacts[*j].trial.thickness_mm)
-    };
-    let at = if bears(&exacts[last]) {
-        last
-    } else {
-        (0..last)
-            .filter(|&i| bears(&exacts[i]))
-            .min_by(thinnest)
-            .unwrap_or(last)
-    };
+    let (at, ratio) = agree(
+        strength_mpa,
+        &mut |limit_mpa| estimate(ctx, params, &coarse, &mut tried, limit_mpa),
+        &mut |mm| {
+            exacts.push(fine.worst(mm)?);
+            Ok(exacts[exacts.len() - 1].trial)
+        },
+    )?;
     let found = exacts.swap_remove(at);
-    let is_too_weak = !bears(&found);
+    let is_too_weak = !bears(&found.trial, strength_mpa);
     let corrected = |t: &Tried| Tried {
         stress_mpa: ratio * t.stress_mpa,
         ..*t
@@ -431,6 +403,55 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
         no_wall_bears: is_too_weak,
         ..found
     })
+}
+
+/// Returns true if a wall withstands the stress, within the error of the analysis.
+fn bears(tried: &Tried, strength_mpa: f64) -> bool {
+    tried.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa
+}
+
+/// Lets two meshes agree on a thickness: `estimate` finds one for a limit in MPa on the coarse mesh, `exact`
+/// tells its stress on the fine one, and the ratio of both stresses changes the next limit.
+///
+/// Returns the index of the call of `exact` that counts, and the last ratio. Where the ratio varies with the
+/// thickness, the thinnest wall of sufficient strength counts, else the one that was named last.
+fn agree(
+    strength_mpa: f64,
+    estimate: &mut dyn FnMut(f64) -> Result<Tried, StrengthError>,
+    exact: &mut dyn FnMut(f64) -> Result<Tried, StrengthError>,
+) -> Result<(usize, f64), StrengthError> {
+    let mut ratio = USUAL_RATIO;
+    let mut exacts: Vec<Tried> = Vec::new();
+    let mut last = 0;
+    for _ in 0..MOST_FINE {
+        let named = estimate(strength_mpa / ratio)?;
+        let is_known = |e: &Tried| e.thickness_mm == named.thickness_mm;
+        if let Some(known) = exacts.iter().position(is_known) {
+            last = known;
+            break;
+        }
+        let told = exact(named.thickness_mm)?;
+        let before = ratio;
+        // A wall without any load teaches nothing.
+        if told.stress_mpa > 0.0 && named.stress_mpa > 0.0 {
+            ratio = told.stress_mpa / named.stress_mpa;
+        }
+        last = exacts.len();
+        exacts.push(told);
+        if (ratio / before).ln().abs() <= RATIO_TOLERANCE {
+            break;
+        }
+    }
+    let thinnest = |i: &usize, j: &usize| exacts[*i].thickness_mm.total_cmp(&exacts[*j].thickness_mm);
+    let at = if bears(&exacts[last], strength_mpa) {
+        last
+    } else {
+        (0..exacts.len())
+            .filter(|&i| bears(&exacts[i], strength_mpa))
+            .min_by(thinnest)
+            .unwrap_or(last)
+    };
+    Ok((at, ratio))
 }
 
 /// Thickness that the coarse mesh suggests for a limit of `limit_mpa`, with its stress there. Thicknesses
@@ -450,7 +471,7 @@ fn estimate(
     if let Some(thinnest) = tried.iter().find(|t| t.stress_mpa <= limit_mpa) {
         return Ok(*thinnest);
     }
-    let usual_mm = USUAL_MM.clamp(params.least_mm, params.most_mm);
+    let usual_mm = params.usual_mm.clamp(params.least_mm, params.most_mm);
     if let Some(known) = tried.iter().find(|t| t.thickness_mm == usual_mm) {
         return Ok(*known);
     }

@@ -48,6 +48,9 @@ pub struct Params {
     pub connector: ConnectorParams,
     /// Distance by which each side of a seam stays back from the cut, mm. [0, 0.4]; 0.05.
     pub seam_gap_mm: f64,
+    /// Overlap of neighbouring printed lines, mm, by which a wall of several lines is thinner than their sum.
+    /// [0, 0.3]; 0, for printers that lay no lines.
+    pub line_overlap_mm: f64,
     /// Spacing of the grid on which fields are sampled, mm. (0, thickness / 2]; `None`: thickness / 2.5.
     pub cell_mm: Option<f64>,
     /// Budget of the exact search for a plan, in pieces revised. [0, 10⁹]; 100 000.
@@ -81,6 +84,7 @@ impl Default for Params {
             label: None,
             connector: ConnectorParams::default(),
             seam_gap_mm: 0.05,
+            line_overlap_mm: 0.0,
             cell_mm: None,
             proof_budget: 100_000,
             allows_thin: false,

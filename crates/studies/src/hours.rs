@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use clap::Args;
+use serde_json::Value;
 use shellock_formats::{NamedObject, read_mesh, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::weld::weld;
@@ -18,6 +19,7 @@ use shellock_geom::{TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::load::Load;
 use shellock_print::plates::{Laid, Plates, Printable, Skin, lay, lay_alone};
+use shellock_print::slicing::Slicing;
 use shellock_print::time::{Cost, PLASTIC_FEATURES, TIME_FEATURES, plastic_features, time_features};
 
 use crate::failure::Failure;
@@ -114,6 +116,8 @@ fn settings(profile: Option<&PathBuf>, is_alone: bool) -> Result<BTreeMap<String
 struct Kit {
     pieces: Vec<TriMesh>,
     whole: TriMesh,
+    /// Thickness of the walls, mm.
+    wall_mm: f64,
 }
 
 impl Kit {
@@ -125,7 +129,7 @@ impl Kit {
             skin: Skin::On(&skin),
         };
         let printables: Vec<Printable<'_>> = self.pieces.iter().map(printable).collect();
-        lay(printer, &printables)
+        lay(printer, Slicing::of_pieces(printer, self.wall_mm), &printables)
     }
 
     fn read(folder: &Path) -> Result<Self, Failure> {
@@ -156,8 +160,23 @@ impl Kit {
         Ok(Self {
             pieces: names.into_iter().map(file).collect::<Result<_, _>>()?,
             whole: file(folder.join("segmentation.ply"))?,
+            wall_mm: wall_of(folder)?,
         })
     }
+}
+
+/// Thickness of the walls that a kit's plan names, mm.
+fn wall_of(folder: &Path) -> Result<f64, Failure> {
+    let path = folder.join("plan.json");
+    let bytes = fs::read(&path).map_err(|source| Failure::File {
+        path: path.clone(),
+        source,
+    })?;
+    let plan: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+    plan["shell_thickness"].as_f64().ok_or_else(|| Failure::Model {
+        path,
+        problem: "it names no wall".into(),
+    })
 }
 
 /// One row for each kit: estimate and slicer, and the slicer's ratio of the kit to its whole model.
@@ -170,13 +189,14 @@ fn kits(slicer: &Slicer, folders: &[PathBuf], is_fast: bool) -> Result<String, F
     let mut rows = Vec::new();
     for folder in folders {
         let kit = Kit::read(folder)?;
+        let settings = Slicing::of_pieces(&printer, kit.wall_mm).settings();
         let plates = kit.lay(&printer);
         let (mut told, mut ours) = (Cost::default(), Cost::default());
         for plate in 0..plates.n_plates {
             let laid: Vec<&Laid> = plates.poses.iter().filter(|l| l.plate == plate).collect();
             let objects = laid
                 .iter()
-                .map(|l| object(&kit.pieces[l.piece], l.axes, l.moved_mm))
+                .map(|l| object(&kit.pieces[l.piece], &settings, l.axes, l.moved_mm))
                 .collect::<Vec<_>>();
             let load = laid.iter().fold(Load::default(), |sum, l| sum.and(l.load));
             ours = ours.and(estimate(&load));
@@ -186,7 +206,7 @@ fn kits(slicer: &Slicer, folders: &[PathBuf], is_fast: bool) -> Result<String, F
             path: folder.clone(),
             problem: "the whole model cannot be laid".into(),
         })?;
-        let whole = slicer.cost(&printer, &[object(&kit.whole, alone.axes, alone.moved_mm)])?;
+        let whole = slicer.cost(&printer, &[object(&kit.whole, &[], alone.axes, alone.moved_mm)])?;
         let marks_mm2: f64 = plates.poses.iter().map(|l| l.outer_support_mm2).sum();
         let row = row(folder, [told, ours, whole, estimate(&alone.load)], marks_mm2);
         eprintln!("{}", row.join(" | "));
@@ -232,14 +252,19 @@ fn row(folder: &Path, [told, ours, whole, whole_ours]: [Cost; 4], marks_mm2: f64
     row
 }
 
-fn object(mesh: &TriMesh, turned: [[f64; 3]; 3], moved_mm: [f64; 3]) -> NamedObject<'_> {
+fn object<'a>(
+    mesh: &'a TriMesh,
+    settings: &'a [(&'static str, &'static str)],
+    turned: [[f64; 3]; 3],
+    moved_mm: [f64; 3],
+) -> NamedObject<'a> {
     NamedObject {
         name: "print",
         color: [200; 3],
         mesh,
         rotation: Some(turned),
         moved_mm,
-        settings: &[],
+        settings,
     }
 }
 
@@ -285,16 +310,23 @@ fn samples(slicer: &Slicer, printer: &Printer, folders: &[PathBuf]) -> Result<Ve
     let mut samples = Vec::new();
     for folder in folders {
         let kit = Kit::read(folder)?;
+        let slicing = Slicing::of_pieces(printer, kit.wall_mm);
         let laid = kit.lay(printer).poses.into_iter();
         let of_pieces = laid.map(|l| {
             (
                 &kit.pieces[l.piece],
+                slicing,
                 Vec3::from_array(l.axes.map(|image| image[2])),
             )
         });
-        let of_whole = lay_alone(printer, &kit.whole).map(|l| (&kit.whole, l.axes.map(|image| image[2])));
-        let poses = of_pieces.chain(of_whole.map(|(mesh, up)| (mesh, Vec3::from_array(up))));
-        for (mesh, up) in poses.flat_map(|(mesh, up)| [(mesh, up), (mesh, slanted)]) {
+        let of_whole = lay_alone(printer, &kit.whole)
+            .map(|l| (&kit.whole, Slicing::USUAL, l.axes.map(|image| image[2])));
+        let poses =
+            of_pieces.chain(of_whole.map(|(mesh, slicing, up)| (mesh, slicing, Vec3::from_array(up))));
+        for (mesh, slicing, up) in
+            poses.flat_map(|(mesh, slicing, up)| [up, slanted].map(|up| (mesh, slicing, up)))
+        {
+            let settings = slicing.settings();
             let (x, y) = up.any_orthonormal_pair();
             let axes = [x, y, up];
             let turned = [0, 1, 2].map(|axis| axes.map(|row| row[axis]));
@@ -304,8 +336,8 @@ fn samples(slicer: &Slicer, printer: &Printer, folders: &[PathBuf]) -> Result<Ve
             };
             let moved_mm = [100.0 - least(x), 100.0 - least(y), -least(up)];
             // A print that touches the bed in one point only has no first layer, and the slicer refuses it.
-            if let Ok(told) = slicer.cost(printer, &[object(mesh, turned, moved_mm)]) {
-                let load = Load::of(mesh, axes, printer);
+            if let Ok(told) = slicer.cost(printer, &[object(mesh, &settings, turned, moved_mm)]) {
+                let load = Load::of(mesh, axes, printer, slicing);
                 samples.push(Sample { load, told });
             }
         }

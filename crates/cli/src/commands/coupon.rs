@@ -11,7 +11,8 @@ use shellock_job::Failure;
 use shellock_job::config::{USUAL, printers_of};
 use shellock_job::files::write;
 use shellock_print::Printer;
-use shellock_print::load::Load;
+use shellock_print::load::{Drawn, Load};
+use shellock_print::slicing::Slicing;
 use shellock_print::time::seconds_flat;
 use shellock_render::palette;
 use toml_edit::{DocumentMut, Item, Table, TableLike};
@@ -158,8 +159,8 @@ impl<'a> Plate<'a> {
         let load = |part: &Part| Load {
             // The parts are laid so that they need no support.
             support_mm3: 0.0,
-            wide_support_mm3: 0.0,
-            ..Load::of(&part.on_plate(), axes, self.printer)
+            drawn: Drawn::default(),
+            ..Load::of(&part.on_plate(), axes, self.printer, Slicing::USUAL)
         };
         let all = self.parts.iter().map(load).fold(Load::default(), Load::and);
         seconds_flat(self.printer, &all)

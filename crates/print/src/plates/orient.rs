@@ -11,8 +11,10 @@ use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use super::foothold::Foothold;
 use super::{Printable, Skin};
 use crate::columns::Columns;
-use crate::load::{Load, Supports};
+use crate::load::Load;
 use crate::printer::{Printer, Process};
+use crate::slicing::Slicing;
+use crate::supports::Supports;
 use crate::time::{grams, seconds};
 
 /// Largest height above the plate, mm, and least cosine of the slope of a face that needs no support because
@@ -106,8 +108,8 @@ struct Prices {
 }
 
 /// Prices of somebody who prints by `process`. In resin, skin matters most, as supports leave pits. In
-/// filament, a cm² of marks costs five minutes: at three minutes, a teddy's kit took 8 % less time, and 35
-/// cm² of its skin were marked instead of 10. A gram of filament costs two minutes, less than half of the
+/// filament, a cm² of marks costs ten minutes: at five minutes, nine kits took 3 % less time, and 68 cm² of
+/// their skin were marked instead of 37. A gram of filament costs two minutes, less than half of the
 /// time to print it. A raft costs ten minutes: it takes a hundredth of the time to print, and it must be
 /// peeled off.
 fn prices(process: Process) -> Prices {
@@ -122,7 +124,7 @@ fn prices(process: Process) -> Prices {
         },
         Process::Fdm => Prices {
             gram_s: 120.0,
-            mark_s: 3.0,
+            mark_s: 6.0,
             cup_s: 0.0,
             peel_s: 0.0,
             falling_s: 3600.0,
@@ -147,8 +149,13 @@ struct Judged {
 
 /// Finds the best pose within `room_mm`: width, depth and height. `None` if the piece is too large in every
 /// pose tried, or has no convex hull.
-pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
-    let body = Body::of(piece)?;
+pub(super) fn best(
+    printer: &Printer,
+    slicing: Slicing,
+    piece: &Printable<'_>,
+    room_mm: [f64; 3],
+) -> Option<Pose> {
+    let body = Body::of(piece, slicing)?;
     let all = |directions: Vec<Vec3>, cell_mm: f64, most_s: f64| -> Vec<Judged> {
         directions
             .into_par_iter()
@@ -194,7 +201,7 @@ fn pose(printer: &Printer, piece: &Printable<'_>, body: &Body<'_>, (axes, bounds
         bounds,
         support: support(&faces, bounds.min.z, up),
         foothold: (printer.process == Process::Fdm).then(|| body.foothold(printer, up)),
-        load: Load::of(mesh, [x, y, up], printer),
+        load: Load::of(mesh, [x, y, up], printer, body.slicing),
     }
 }
 
@@ -205,7 +212,7 @@ fn cheapest_first(judged: &mut [Judged]) {
 
 /// Returns true if some pose fits into `room_mm`: width, depth and height.
 pub(super) fn fits(piece: &Printable<'_>, room_mm: [f64; 3]) -> bool {
-    Body::of(piece).is_some_and(|body| {
+    Body::of(piece, Slicing::USUAL).is_some_and(|body| {
         let mut directions = body.directions().into_iter();
         directions.any(|up| body.best_turn(up, room_mm).is_some())
     })
@@ -234,6 +241,7 @@ struct Body<'a> {
     /// The simple mesh, and its faces.
     mesh: &'a TriMesh,
     faces: Vec<Face>,
+    slicing: Slicing,
 }
 
 struct Face {
@@ -256,7 +264,7 @@ impl Face {
 }
 
 impl<'a> Body<'a> {
-    fn of(piece: &Printable<'a>) -> Option<Self> {
+    fn of(piece: &Printable<'a>, slicing: Slicing) -> Option<Self> {
         let hull = Volume::hull(&piece.mesh.points).to_mesh();
         if hull.triangles.is_empty() {
             return None;
@@ -269,6 +277,7 @@ impl<'a> Body<'a> {
             exact: piece.mesh,
             mesh,
             faces: (0..mesh.triangles.len()).map(face).collect(),
+            slicing,
         })
     }
 
@@ -329,7 +338,8 @@ impl<'a> Body<'a> {
         let prices = prices(printer.process);
         let (x, y) = up.any_orthonormal_pair();
         let columns = Columns::of(self.mesh, [x, y, up], cell_mm);
-        let mut load = Load::without_slices(self.mesh, up, printer, &columns);
+        let supports = Supports::of(&columns, printer, self.slicing.supports);
+        let mut load = Load::without_slices(self.mesh, up, printer, self.slicing, &columns, &supports);
         let marks_s = prices.mark_s * self.support(up).outer_mm2;
         let printing_s =
             |load: &Load| seconds(printer, load) + prices.gram_s * grams(printer, load) + marks_s;
@@ -337,9 +347,9 @@ impl<'a> Body<'a> {
             let cost_s = printing_s(&load);
             return Judged { cost_s, up };
         }
-        load.add_slices(printer, &columns);
+        load.add_slices(printer, &columns, &supports);
         let mut cost_s = printing_s(&load) + prices.cup_s * load.cup_mm3 + prices.peel_s * load.widest_mm2;
-        if prices.falling_s > 0.0 && !self.stands(&columns, [x, y], printer.layer_mm) {
+        if prices.falling_s > 0.0 && !self.stands(&columns, &supports, [x, y]) {
             cost_s += prices.falling_s;
         }
         cost_s += self.raft_s(printer, up);
@@ -373,8 +383,7 @@ impl<'a> Body<'a> {
     }
 
     /// Returns true if the centre of mass is above the foot and the supports on the plate, with a margin.
-    fn stands(&self, columns: &Columns, axes: [Vec3; 2], layer_mm: f64) -> bool {
-        let supports = Supports::of(columns, layer_mm);
+    fn stands(&self, columns: &Columns, supports: &Supports, axes: [Vec3; 2]) -> bool {
         let [x, y] = axes.map(|axis| self.center.dot(axis));
         let foot: Vec<[f64; 2]> = (0..columns.len())
             .filter(|&column| {

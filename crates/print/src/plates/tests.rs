@@ -29,7 +29,7 @@ fn a_bowl_lies_with_no_support_on_its_skin() {
     let (mesh, ball) = (bowl(), contoured_ball(20.0, 1.0));
     let skin = TriangleBvh::new(&ball);
     for printer in [Printer::sla(), Printer::fdm()] {
-        let plates = lay(&printer, &[printable(&mesh, Skin::On(&skin))]);
+        let plates = lay(&printer, Slicing::USUAL, &[printable(&mesh, Skin::On(&skin))]);
         let laid = plates.poses[0];
         assert_eq!(laid.outer_support_mm2, 0.0, "{}", printer.name);
         assert!(laid.support_mm2 > 0.0, "its inner side hangs over");
@@ -50,7 +50,7 @@ fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
         bed_mm: [100.0, 80.0, 90.0],
         ..Printer::fdm()
     };
-    let plates = lay(&printer, &pieces);
+    let plates = lay(&printer, Slicing::USUAL, &pieces);
     assert_eq!((plates.poses.len(), plates.too_large.len()), (8, 0));
     let boxes: Vec<Aabb> = plates
         .poses
@@ -85,6 +85,7 @@ fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
     // The diagonal of 212 × 212 mm is 300.
     let plates = lay(
         &Printer::fdm(),
+        Slicing::USUAL,
         &[printable(&rod, Skin::None), printable(&long, Skin::None)],
     );
     assert_eq!(
@@ -103,13 +104,13 @@ fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
 
 #[test]
 fn nothing_needs_no_plate_and_a_flat_mesh_is_no_piece() {
-    assert_eq!(lay(&Printer::sla(), &[]), Plates::default());
+    assert_eq!(lay(&Printer::sla(), Slicing::USUAL, &[]), Plates::default());
     let flat = TriMesh {
         points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
         triangles: vec![[0, 1, 2]],
     };
     assert_eq!(
-        lay(&Printer::sla(), &[printable(&flat, Skin::All)]).too_large,
+        lay(&Printer::sla(), Slicing::USUAL, &[printable(&flat, Skin::All)]).too_large,
         [0]
     );
 }
@@ -129,7 +130,7 @@ fn swaps_make_plates_no_worse_and_lose_no_piece() {
             .collect();
         let poses: Vec<(usize, Pose)> = boxes
             .iter()
-            .map(|mesh| orient::best(&printer, &printable(mesh, Skin::None), room).unwrap())
+            .map(|mesh| orient::best(&printer, Slicing::USUAL, &printable(mesh, Skin::None), room).unwrap())
             .enumerate()
             .collect();
         let order: Vec<usize> = (0..poses.len()).collect();
@@ -155,7 +156,7 @@ fn poses_that_are_found_on_a_simple_mesh_cost_about_as_much_as_those_of_the_piec
                 simple,
                 ..printable(&mesh, Skin::All)
             };
-            lay(&printer, &[piece]).poses[0]
+            lay(&printer, Slicing::USUAL, &[piece]).poses[0]
         };
         let (exact, quick) = (by(&mesh), by(&simple));
         let seconds = |laid: &Laid| crate::time::seconds(&printer, &laid.load);
@@ -166,7 +167,7 @@ fn poses_that_are_found_on_a_simple_mesh_cost_about_as_much_as_those_of_the_piec
         );
         // Figures are those of the piece, whichever mesh the pose was found on.
         let axes = [0, 1, 2].map(|row| Vec3::from_array(quick.axes.map(|column| column[row])));
-        let volume_mm3 = Load::of(&mesh, axes, &printer).volume_mm3;
+        let volume_mm3 = Load::of(&mesh, axes, &printer, Slicing::USUAL).volume_mm3;
         assert_eq!(quick.load.volume_mm3, volume_mm3);
     }
 }

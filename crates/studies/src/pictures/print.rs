@@ -5,6 +5,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::booklet::Booklet;
 use shellock_print::plates::{Printable, Skin, lay};
+use shellock_print::slicing::Slicing;
 use shellock_render::stills::{Camera, Painted, render};
 
 use super::draw::{PALE, plain};
@@ -29,7 +30,11 @@ pub fn plates(kit: &Kit) -> Vec<u8> {
         .collect();
     let mut cells = Vec::new();
     for printer in [Printer::fdm(), Printer::sla()] {
-        let plates = lay(&printer, &printables);
+        let plates = lay(
+            &printer,
+            Slicing::of_pieces(&printer, kit.settings.body.thickness_mm),
+            &printables,
+        );
         for plate in 0..plates.n_plates {
             let on_plate: Vec<_> = plates.poses.iter().filter(|l| l.plate == plate).collect();
             let laid: Vec<(TriMesh, [u8; 3])> = on_plate
