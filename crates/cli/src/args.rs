@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use shellock::coupon::N_FITS;
-use shellock_job::options::{find_printer, units};
+use shellock_job::options::units;
+use shellock_job::printers::find_printer;
 use shellock_print::Printer;
 
 pub use blows::Blows;
@@ -134,6 +135,8 @@ pub enum Command {
     Studio(StudioOptions),
     /// Make kits of all models in a folder; finished kits are kept, so that a stopped batch can continue
     Batch(Box<BatchOptions>),
+    /// List the printers that --printer knows: those that come with the program, and your own
+    Printers(PrintersOptions),
     /// Print the completions of commands and options for a shell, for example `shellock completions bash`
     Completions {
         /// Shell that the completions are for
@@ -333,6 +336,17 @@ pub struct CouponOptions {
     /// Save the clearances of that number in the configuration file, as a printer of this name
     #[arg(long, value_name = "NAME", requires = "fits")]
     pub save: Option<String>,
+}
+
+/// Options of the command `printers`.
+#[derive(clap::Args)]
+pub struct PrintersOptions {
+    /// File with printers of your own [default: shellock.toml, if there is one]
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Printers that the file declares.
+    #[arg(skip)]
+    pub own_printers: Vec<Printer>,
 }
 
 impl CouponOptions {

@@ -7,6 +7,7 @@ pub mod figure;
 pub mod inspect;
 pub mod own_assembly;
 pub mod plan;
+pub mod printers;
 pub mod report;
 pub mod segment;
 pub mod studio;

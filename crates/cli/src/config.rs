@@ -196,7 +196,7 @@ fn file_of(given: &ArgMatches) -> Option<PathBuf> {
 }
 
 fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
-    use args::Command::{Batch, Build, Coupon, Demo, Inspect, Plan, Segment};
+    use args::Command::{Batch, Build, Coupon, Demo, Inspect, Plan, Printers, Segment};
     match command {
         Build { options, .. }
         | Demo { options, .. }
@@ -205,6 +205,7 @@ fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
         | Inspect { options, .. } => Some(&mut options.options.own_printers),
         Batch(options) => Some(&mut options.options.options.own_printers),
         Coupon(options) => Some(&mut options.own_printers),
+        Printers(options) => Some(&mut options.own_printers),
         _ => None,
     }
 }

@@ -18,7 +18,8 @@ use serde_json::json;
 
 use args::Command;
 use commands::{
-    batch, build, coupon, figure, inspect, own_assembly, plan, report, segment, studio, test, verify,
+    batch, build, coupon, figure, inspect, own_assembly, plan, printers, report, segment, studio, test,
+    verify,
 };
 pub use manual::options_guide;
 use shellock_job::Failure;
@@ -201,6 +202,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
             inspect::inspect(session, &model, &options.options, wanted)
         }
         Command::Coupon(options) => coupon::coupon(session, &options),
+        Command::Printers(options) => Ok(printers::printers(session, &options.own_printers)),
         Command::Studio(options) => studio::studio(session, &options),
         Command::Batch(options) => batch::batch(session, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),

@@ -15,9 +15,11 @@ use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
+use shellock_print::printer::Pace;
 use shellock_print::{Printer, Process};
 
 use crate::options::material;
+use crate::printers;
 use crate::project::ModelOf;
 
 /// Name of the file that is read without being named.
@@ -39,6 +41,7 @@ pub struct Config {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Own {
+    title: Option<String>,
     like: Option<String>,
     process: Option<String>,
     bed: Option<[f64; 3]>,
@@ -49,6 +52,14 @@ struct Own {
     min_wall: Option<f64>,
     layer: Option<f64>,
     material: Option<String>,
+    fast: Option<bool>,
+}
+
+impl Own {
+    fn pace(&self) -> Option<Pace> {
+        self.fast
+            .map(|is_fast| if is_fast { Pace::Fast } else { Pace::Usual })
+    }
 }
 
 /// Reads a configuration file.
@@ -81,10 +92,7 @@ fn parse(text: &str) -> Result<Config, String> {
     let mut options: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
     let printers = match options.remove("printers") {
         None => Vec::new(),
-        Some(toml::Value::Table(printers)) => printers
-            .into_iter()
-            .map(|(name, value)| own_printer(name, value))
-            .collect::<Result<_, _>>()?,
+        Some(toml::Value::Table(printers)) => printers_in(printers, printers::shipped())?,
         Some(_) => return Err("\"printers\" must be a table; write for example [printers.mine]".to_owned()),
     };
     let model = options.remove("model").map(toml::Value::try_into).transpose();
@@ -96,7 +104,19 @@ fn parse(text: &str) -> Result<Config, String> {
     })
 }
 
-fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
+/// Returns the printers that a text declares, each under its name, like one of `known`.
+pub(crate) fn table_of_printers(text: &str, known: &[Printer]) -> Result<Vec<Printer>, String> {
+    printers_in(text.parse().map_err(|e: toml::de::Error| e.to_string())?, known)
+}
+
+fn printers_in(table: toml::Table, known: &[Printer]) -> Result<Vec<Printer>, String> {
+    let printers = table.into_iter();
+    printers
+        .map(|(name, value)| own_printer(name, value, known))
+        .collect()
+}
+
+fn own_printer(name: String, value: toml::Value, known: &[Printer]) -> Result<Printer, String> {
     let fault = |problem: String| format!("printer \"{name}\": {problem}");
     let own: Own = value
         .try_into()
@@ -117,7 +137,7 @@ fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
             own.like.as_deref().unwrap_or_default()
         ))
     };
-    let base = Printer::presets().into_iter().find(is_base).ok_or_else(unknown)?;
+    let base = known.iter().find(|p| is_base(p)).cloned().ok_or_else(unknown)?;
     let material = own.material.as_deref().map(material).transpose().map_err(fault)?;
     let printer = Printer {
         process: process.unwrap_or(base.process),
@@ -128,6 +148,8 @@ fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
         min_wall_mm: own.min_wall.unwrap_or(base.min_wall_mm),
         layer_mm: own.layer.unwrap_or(base.layer_mm),
         material: material.unwrap_or(base.material),
+        pace: own.pace().or(base.pace),
+        title: own.title.unwrap_or(base.title),
         name: name.clone(),
     };
     match printer.problems().first() {

@@ -35,6 +35,7 @@ pub mod own_assembly;
 mod page;
 pub mod paint;
 pub mod place;
+pub mod printers;
 pub mod printing;
 pub mod project;
 pub mod savings;

@@ -22,9 +22,7 @@ use shellock_mechanics::Material;
 use shellock_print::Printer;
 pub use table::{DECLARED, Declared, Kind, declaration};
 use values::label;
-pub use values::{
-    Axis, InsideOutMeans, LabelsFrom, PaperSize, Thickness, Unit, Word, Words, find_printer, material, word,
-};
+pub use values::{Axis, InsideOutMeans, LabelsFrom, PaperSize, Thickness, Unit, Word, Words, material, word};
 
 /// Function that sets an option to the value that a text says; fails with the reason if it says none.
 pub type Take = fn(&mut Options, &str) -> Result<(), String>;
@@ -182,7 +180,7 @@ const REVISIONS_PER_SECOND: f64 = 20_000.0;
 impl Options {
     /// Finds the named printer among the user's own and those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
-        find_printer(&self.printer, &self.own_printers)
+        crate::printers::find_printer(&self.printer, &self.own_printers)
     }
 
     /// Parameters of the library for pieces made on `printer`.

@@ -164,9 +164,10 @@ impl Printing {
 
     /// Printer that the time is estimated for.
     fn printer_words(&self) -> &'static str {
-        match self.printer.process {
-            Process::Fdm => "a printer like the Prusa MK3S",
-            Process::Sla | Process::Sls => "this printer",
+        if self.fast.is_some() {
+            "a printer like the Prusa MK3S"
+        } else {
+            "this printer"
         }
     }
 

@@ -51,8 +51,8 @@ fn settings(printer: &Printer, slicing: Slicing) -> Vec<String> {
         ],
         Process::Fdm => [
             format!(
-                "Layer height {layer} mm, with {} perimeters (wall loops), so that walls and connectors print \
-                 solid. Infill makes little difference.",
+                "Layer height {layer} mm, with {} perimeters (wall loops), so that walls and connectors \
+                 print solid. Infill makes little difference.",
                 slicing.n_perimeters
             ),
             "Supports everywhere, in the style \"snug\", for slopes of up to 40° from level. Pieces that \

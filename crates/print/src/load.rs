@@ -63,7 +63,7 @@ pub struct Load {
 /// Supports of a filament print in the shape in which the slicer draws them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drawn {
-    /// Volume, mm³.
+    /// Volume that they fill, mm³.
     pub volume_mm3: f64,
     /// Area of the sides, mm².
     pub side_mm2: f64,
@@ -325,8 +325,8 @@ impl Filament {
     fn add(&mut self, step_mm: f64, cell_mm: f64, load: &mut Load) {
         let (slice, cell_mm2) = (&mut self.slice, cell_mm * cell_mm);
         let width = slice.width;
-        // Two perimeters are about a cell wide, so a cell with a neighbour outside has no infill. More of them
-        // are up to two cells wide.
+        // Two perimeters are about a cell wide, so a cell with a neighbour outside has no infill. More of
+        // them are up to two cells wide.
         let mut filled = slice.none();
         for &(_, cell) in &slice.cells {
             filled[cell] = slice.inside[cell] && slice.neighbours(cell).iter().all(|&n| slice.inside[n]);

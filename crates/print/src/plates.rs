@@ -118,7 +118,8 @@ pub struct Plates {
     pub too_large: Vec<usize>,
 }
 
-/// Orients all `pieces`, which are sliced alike, and packs them on plates of `printer`. Deterministic: equal input gives equal plates.
+/// Orients all `pieces`, which are sliced alike, and packs them on plates of `printer`. Deterministic: equal
+/// input gives equal plates.
 ///
 /// Takes 0.1 to 0.3 s for a piece of 20 000 triangles: up to 150 poses are judged coarsely, 10 finely.
 pub fn lay(printer: &Printer, slicing: Slicing, pieces: &[Printable<'_>]) -> Plates {
@@ -271,8 +272,8 @@ pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
     box_mm.iter().zip(room).all(|(side, room)| *side <= room)
 }
 
-/// Returns the pose of a whole model that needs the least support, on a plate of unlimited size, with supports
-/// as the slicer's profile draws them. `None` for a mesh without a convex hull, such as a flat one.
+/// Returns the pose of a whole model that needs the least support, on a plate of unlimited size, with
+/// supports as the slicer's profile draws them. `None` for a mesh without a convex hull, such as a flat one.
 pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
     let simple = decimate(mesh.clone(), &vec![SIMPLE_MM; mesh.points.len()]);
     let piece = Printable {

@@ -27,11 +27,22 @@ impl Process {
     }
 }
 
+/// Speed of a filament printer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// Prints outlines at 35 and 60 mm/s, as a Prusa MK3S does.
+    Usual,
+    /// Prints outlines at 200 and 300 mm/s and accelerates by 10 m/s².
+    Fast,
+}
+
 /// Properties of a printer. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printer {
-    /// Common name of the printer.
+    /// Short name, by which people choose it.
     pub name: String,
+    /// Full name, with that of the maker.
+    pub title: String,
     /// Process by which it prints.
     pub process: Process,
     /// Width, depth and height of the build volume. [10, 5000] each.
@@ -48,6 +59,8 @@ pub struct Printer {
     pub layer_mm: f64,
     /// Material that it prints with.
     pub material: Material,
+    /// Speed of a filament printer; `None` if it is not known.
+    pub pace: Option<Pace>,
 }
 
 impl Printer {
@@ -56,6 +69,7 @@ impl Printer {
     pub fn sla() -> Self {
         Self {
             name: "sla".into(),
+            title: "Resin printer with a ten-inch display".into(),
             process: Process::Sla,
             bed_mm: [192.0, 120.0, 200.0],
             clearance_mm: 0.12,
@@ -64,6 +78,7 @@ impl Printer {
             min_wall_mm: 0.4,
             layer_mm: 0.05,
             material: Material::SLA_RESIN,
+            pace: None,
         }
     }
 
@@ -71,6 +86,7 @@ impl Printer {
     pub fn fdm() -> Self {
         Self {
             name: "fdm".into(),
+            title: "Filament printer, nozzle of 0.4 mm".into(),
             process: Process::Fdm,
             bed_mm: [220.0, 220.0, 250.0],
             clearance_mm: 0.2,
@@ -79,6 +95,7 @@ impl Printer {
             min_wall_mm: 0.45,
             layer_mm: 0.2,
             material: Material::PLA,
+            pace: None,
         }
     }
 
@@ -86,6 +103,7 @@ impl Printer {
     pub fn fdm_petg() -> Self {
         Self {
             name: "fdm-petg".into(),
+            title: "Filament printer with PETG, nozzle of 0.4 mm".into(),
             clearance_mm: 0.3,
             key_clearance_mm: 0.32,
             tolerance_mm: 0.14,
@@ -98,6 +116,7 @@ impl Printer {
     pub fn sls() -> Self {
         Self {
             name: "sls".into(),
+            title: "Sintering printer".into(),
             process: Process::Sls,
             bed_mm: [165.0, 165.0, 300.0],
             clearance_mm: 0.25,
@@ -106,6 +125,7 @@ impl Printer {
             min_wall_mm: 0.6,
             layer_mm: 0.11,
             material: Material::PA12,
+            pace: None,
         }
     }
 

@@ -1,4 +1,4 @@
-//! Choices of a slicer that decide what a print costs: the style of its supports and the number of perimeters.
+//! Choices of a slicer that decide what a print costs: style of supports and number of perimeters.
 
 use crate::printer::{Printer, Process};
 
@@ -33,7 +33,7 @@ pub enum Style {
 /// Choices of a slicer for one print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slicing {
-    /// Style of supports.
+    /// Style of the supports.
     pub supports: Style,
     /// Number of perimeters of a filament print.
     pub n_perimeters: usize,

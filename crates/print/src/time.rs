@@ -5,11 +5,11 @@
 //! one, faded over ten. This is PrusaSlicer's own formula; a print that was compared differs by 0.02 %. A
 //! print that needs supports is lifted off a pad as a whole.
 //!
-//! Filament: the features are all outlines, perimeters beyond two, short loops, solid and sparse fill, and for
-//! supports their volume, outlines and solid top layers. The references are PrusaSlicer's profile "0.20mm SPEED" for the
-//! MK3S and a plain profile with the speeds of fast printers ([`Pace`]). Both have 15 % infill; perimeters and
-//! supports are those of [`Slicing`](crate::slicing::Slicing). `cargo xtask study hours` slices pieces and fits the
-//! coefficients.
+//! Filament: the features are all outlines, perimeters beyond two, short loops, solid and sparse fill, and
+//! for supports their volume, outlines and solid top layers. The references are PrusaSlicer's profile "0.20mm
+//! SPEED" for the MK3S and a plain profile with the speeds of fast printers ([`Pace`]). Both have 15 %
+//! infill; perimeters and supports are those of [`Slicing`](crate::slicing::Slicing). `cargo xtask study
+//! hours` slices pieces and fits the coefficients.
 //! Limits: layers of 0.2 mm, curved shells and whole models. Boxes take less than estimated (a cube of 40 mm
 //! by half), since long straight lines reach their full speed. A small piece alone takes more, as the
 //! slicer waits for layers to cool.
@@ -17,7 +17,7 @@
 //! Powder: height alone counts, as every layer is spread alike.
 
 use crate::load::{Load, SOLID_LAYERS};
-use crate::printer::{Printer, Process};
+use crate::printer::{Pace, Printer, Process};
 
 /// Times of the steps of a resin layer, and extra exposure of the first layer, seconds.
 const TILT_S: f64 = 5.0;
@@ -35,15 +35,6 @@ const RESIN_MM3: [f64; 2] = [2.9, 0.1];
 /// Wall thickness to which people hollow resin models, mm.
 const HOLLOWED_MM: f64 = 2.0;
 
-/// Speed of a filament printer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
-    /// Prints outlines at 35 and 60 mm/s, as a Prusa MK3S does.
-    Usual,
-    /// Prints outlines at 200 and 300 mm/s and accelerates by 10 m/s².
-    Fast,
-}
-
 /// Names of the features that filament print time is linear in.
 pub const TIME_FEATURES: [&str; 9] = [
     "outlines",
@@ -60,15 +51,15 @@ pub const TIME_FEATURES: [&str; 9] = [
 const OUTLINE_MM: f64 = 0.9;
 const PERIMETER_MM: f64 = 0.41;
 /// Seconds per unit of each feature, at the usual and at a fast pace: mm of all outlines with two perimeters;
-/// mm of a third and fourth perimeter; mm of a short loop;
-/// mm² of a solid layer within the perimeters of walls, of floors; mm² of a sparse layer; mm² of supports in
-/// a layer, mm of their outline; mm² of their upper ends. Narrow fill within walls takes far longer than a
-/// floor. Floors were not fitted: their price is that of a line's width and speed.
+/// mm of a third and fourth perimeter; mm of a short loop; mm² of a solid layer within the perimeters of
+/// walls, of floors; mm² of a sparse layer; mm² of supports in a layer, mm of their outline; mm² of their
+/// upper ends. Narrow fill within walls takes far longer than a floor. Floors were not fitted: their price is
+/// that of a line's width and speed.
 ///
-/// Least squares over 180 prints by PrusaSlicer 2.5: 82 pieces of seven kits on snug supports, half of them with
-/// two perimeters and half as kits are sliced, and whole models, each in the pose on the plate and in a slanted
-/// one. A single print is off by 6 % in the median at the usual pace and by 5 % at the fast one; nine of ten
-/// are within 18 and 15 %.
+/// Least squares over 180 prints by PrusaSlicer 2.5: 82 pieces of seven kits on snug supports, half of them
+/// with two perimeters and half as kits are sliced, and whole models, each in the pose on the plate and in a
+/// slanted one. A single print is off by 6 % in the median at the usual pace and by 5 % at the fast one; nine
+/// of ten are within 18 and 15 %.
 const TIME_S: [[f64; 9]; 2] = [
     [
         0.0903, 0.0300, 0.0560, 0.1058, 0.0111, 0.0115, 0.0009, 0.0459, 0.6710,
@@ -156,9 +147,9 @@ impl Cost {
         }
     }
 
-    /// Estimates the cost of one plate on a fast printer; `None` if the process has one pace only.
+    /// Estimates the cost of one plate on a fast printer; `None` unless the printer's pace is open.
     pub fn of_fast(printer: &Printer, load: &Load) -> Option<Self> {
-        (printer.process == Process::Fdm).then(|| Self {
+        (printer.process == Process::Fdm && printer.pace.is_none()).then(|| Self {
             seconds: filament_seconds(printer, load, Pace::Fast),
             grams: in_grams(printer, filament_mm3(load, Pace::Fast)),
         })
@@ -226,7 +217,7 @@ fn seconds_above(printer: &Printer, load: &Load, lifted_mm: f64) -> f64 {
     }
     match printer.process {
         Process::Sla => n_layers * (TILT_S + EXPOSURE_S + LIFT_S) + 13.0 * LONGER_S - 56.0 * LONGER_S / 11.0,
-        Process::Fdm => filament_seconds(printer, load, Pace::Usual),
+        Process::Fdm => filament_seconds(printer, load, printer.pace.unwrap_or(Pace::Usual)),
         Process::Sls => n_layers * POWDER_S,
     }
 }
@@ -241,7 +232,7 @@ fn filament_seconds(printer: &Printer, load: &Load, pace: Pace) -> f64 {
 pub fn grams(printer: &Printer, load: &Load) -> f64 {
     let mm3 = match printer.process {
         Process::Sla => load.volume_mm3 + product([load.shadow_mm2, load.support_mm3], RESIN_MM3),
-        Process::Fdm => filament_mm3(load, Pace::Usual),
+        Process::Fdm => filament_mm3(load, printer.pace.unwrap_or(Pace::Usual)),
         Process::Sls => load.volume_mm3,
     };
     in_grams(printer, mm3)
@@ -283,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_printer_is_faster_and_only_filament_has_two_paces() {
+    fn a_fast_printer_is_faster_and_only_filament_of_open_pace_has_two_figures() {
         let load = Load {
             height_mm: 20.0,
             volume_mm3: 2e4,
@@ -294,6 +285,12 @@ mod tests {
         let fast = Cost::of_fast(&fdm, &load).unwrap();
         assert!(fast.seconds < 0.6 * seconds(&fdm, &load));
         assert_eq!(Cost::of_fast(&Printer::sla(), &load), None);
+        let known = Printer {
+            pace: Some(Pace::Fast),
+            ..Printer::fdm()
+        };
+        assert_eq!(Cost::of(&known, &load), fast);
+        assert_eq!(Cost::of_fast(&known, &load), None);
     }
 
     #[test]

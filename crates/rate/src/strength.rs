@@ -102,8 +102,8 @@ pub struct StrengthParams {
     /// walls leave a figure of 150 mm little cavity, and where 3 mm are too weak, 10 mm rarely suffice
     /// (docs/notes/strength.md).
     pub most_mm: f64,
-    /// Wall of a model whose stress is too high with every wall, unless the limits forbid it. [0.4, 20]; 2, to
-    /// which people hollow models. A thicker one would break, too, and weigh more.
+    /// Wall of a model whose stress is too high with every wall, unless the limits forbid it. [0.4, 20]; 2,
+    /// to which people hollow models. A thicker one would break, too, and weigh more.
     pub usual_mm: f64,
     /// Share of the hollow area whose stress may exceed the decisive one. [0, 0.2]; 0.005.
     pub peak_share: f64,

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use shellock_job::Options;
-use shellock_job::options::{DECLARED, Declared, Kind, Word, word};
+use shellock_job::options::{DECLARED, Declared, Kind, Take, Word, word};
+use shellock_job::printers::shipped;
 
 /// Name of the option after which the configuration file is shown.
 const BEFORE_CONFIG: &str = "printer";
@@ -128,9 +129,38 @@ fn argument(option: &'static Declared) -> Arg {
                 option.words().into_iter().map(possible),
             ))
             .hide_possible_values(true),
+        Kind::Text(take) if option.name == "printer" => {
+            arg.value_parser(PrinterName(take)).hide_possible_values(true)
+        }
         Kind::Text(take) => {
             arg.value_parser(move |text: &str| take(&mut Options::default(), text).map(|()| text.to_owned()))
         }
+    }
+}
+
+/// Parser of a printer's name. Any name may be a printer of the user, so those that come with the program are
+/// only suggested, by the completions of a shell.
+#[derive(Clone)]
+struct PrinterName(Take);
+
+impl TypedValueParser for PrinterName {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        arg: Option<&Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<String, clap::Error> {
+        let take = self.0;
+        let name = move |text: &str| take(&mut Options::default(), text).map(|()| text.to_owned());
+        name.parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(
+            shipped().iter().map(|p| PossibleValue::new(p.name.as_str())),
+        ))
     }
 }
 

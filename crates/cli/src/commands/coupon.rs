@@ -10,6 +10,7 @@ use shellock_geom::{TriMesh, Vec3};
 use shellock_job::Failure;
 use shellock_job::config::{USUAL, printers_of};
 use shellock_job::files::write;
+use shellock_job::printers::shipped;
 use shellock_print::Printer;
 use shellock_print::load::{Drawn, Load};
 use shellock_print::slicing::Slicing;
@@ -250,7 +251,7 @@ fn tell_profile(session: &Session, path: &Path, base: &Printer, fit: &Fit, name:
 fn save(path: &Path, base: &Printer, fit: &Fit, name: &str) -> Result<(), Failure> {
     let wrong = |problem: String| Failure::Wrong(format!("{}: {problem}", path.display()));
     let is_called = |p: &Printer| p.name.eq_ignore_ascii_case(name);
-    if Printer::presets().iter().any(is_called) {
+    if shipped().iter().any(is_called) {
         return Err(Failure::Wrong(format!(
             "the printer \"{name}\" comes with the program and stays as it is; choose another name with \
              --save"

@@ -8,6 +8,7 @@ use shellock_print::Printer;
 use super::{DECLARED, Declared, Kind, Options};
 use crate::build::check_options;
 use crate::failure::Failure;
+use crate::printers::shipped;
 
 /// Options that the choices leave out, because they name files.
 const LEFT_OUT: [&str; 1] = ["labels"];
@@ -106,7 +107,7 @@ fn known_values(option: &Declared, own_printers: &[Printer]) -> Vec<String> {
         "printer" => own_printers
             .iter()
             .cloned()
-            .chain(Printer::presets())
+            .chain(shipped().iter().cloned())
             .map(|p| p.name)
             .collect(),
         "material" => Material::PRESETS.map(|(name, _)| name.to_owned()).to_vec(),

@@ -218,9 +218,10 @@ pub const DECLARED: &[Declared] = &[
         Ok(())
     })
     .help(
-        "sla, fdm, fdm-petg, sls, or a printer of your own",
-        "Printer that the kit is made for: sla, fdm, fdm-petg, sls, or a printer from the configuration \
-         file; its clearances, walls and material are the defaults",
+        "sla, fdm, fdm-petg, sls, bambu-a1 and others (see shellock printers), or your own",
+        "Printer that the kit is made for: sla, fdm, fdm-petg, sls, a common printer such as bambu-a1 \
+         (shellock printers lists them), or a printer from the configuration file; its bed, clearances, \
+         walls and material are the defaults",
     )
     .default("sla"),
     text(SIZE, "size", "MM", |o, t| length_mm(t).map(|v| o.size = Some(v)))

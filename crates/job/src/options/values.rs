@@ -1,4 +1,4 @@
-//! Values of options: words, sizes, materials and printers, each with the rule that reads it from a text.
+//! Values of options: words, sizes and materials, each with the rule that reads it from a text.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -9,7 +9,6 @@ use shellock::segmentation::Method;
 use shellock::sizes::SizeChoice;
 use shellock_geom::repair::InsideOut;
 use shellock_mechanics::Material;
-use shellock_print::Printer;
 use shellock_print::booklet::Paper;
 
 use super::units;
@@ -289,14 +288,6 @@ pub fn material(name: &str) -> Result<Material, String> {
         .find(|(preset, _)| preset.eq_ignore_ascii_case(name))
         .map(|(_, material)| material);
     found.ok_or_else(|| no_such("material", name, &Material::PRESETS.map(|(preset, _)| preset)))
-}
-
-/// Finds a printer by name, in any case: one of the user's `own`, or one that comes with the program.
-pub fn find_printer(name: &str, own: &[Printer]) -> Result<Printer, String> {
-    let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
-    let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
-    let names: Vec<&str> = known.iter().map(|p| p.name.as_str()).collect();
-    found.ok_or_else(|| no_such("printer", name, &names))
 }
 
 /// Parameters for engraved numbers: strokes two lines wide, and a wall behind them that the printer can make.
