@@ -15,7 +15,7 @@ fn output_of(o: &Output) -> String {
     String::from_utf8_lossy(&o.stdout).into_owned() + &String::from_utf8_lossy(&o.stderr)
 }
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "build",
     "demo",
     "segment",
@@ -28,6 +28,7 @@ const COMMANDS: [&str; 12] = [
     "manual",
     "inspect",
     "figure",
+    "printers",
 ];
 
 #[test]

