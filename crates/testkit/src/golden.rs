@@ -37,7 +37,7 @@ pub const QUICK: [Case; 3] = [
             "--figure",
             "dinosaur",
             "--size",
-            "40",
+            "36",
             "--pieces",
             "3",
             "--key",
