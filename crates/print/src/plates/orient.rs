@@ -108,8 +108,8 @@ struct Prices {
 }
 
 /// Prices of somebody who prints by `process`. In resin, skin matters most, as supports leave pits. In
-/// filament, a cm² of marks costs ten minutes: at five minutes, nine kits took 3 % less time, and 68 cm² of
-/// their skin were marked instead of 37. A gram of filament costs two minutes, less than half of the
+/// filament, a cm² of marks costs ten minutes: at seven and a half, nine kits took 2 % less time, and 68 cm²
+/// of their skin were marked instead of 42. A gram of filament costs two minutes, less than half of the
 /// time to print it. A raft costs ten minutes: it takes a hundredth of the time to print, and it must be
 /// peeled off.
 fn prices(process: Process) -> Prices {
